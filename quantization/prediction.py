@@ -24,11 +24,12 @@ from export.prediction.bundle import CODES, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
+from export.prediction.expected_graph import EXPECTED
 from export.prediction.pictures.picture_error import psnr_db
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
-from quantization.transformer import quantize_transformer, transformer_cost
+from quantization.transformer import quantize_expected, quantize_transformer, transformer_cost
 
 
 def frames_of(data: Path, sets: Sequence[str], split: str, count: int) -> np.ndarray:
@@ -95,7 +96,10 @@ def main() -> None:
     measured = cost(options.fp32, options.out, held_out, codes)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    (options.out / TRANSFORMER).unlink(missing_ok=True)  # of an earlier bundle
+    for name in (TRANSFORMER, f"{EXPECTED}.onnx"):  # of an earlier bundle
+        (options.out / name).unlink(missing_ok=True)
+    if (options.fp32 / f"{EXPECTED}.onnx").exists():
+        quantize_expected(options.fp32, options.out)
     if (options.fp32 / TRANSFORMER).exists():
         quantize_transformer(options.fp32, options.out)
         clips = read_codes(options.codes, "val")

@@ -8,12 +8,15 @@ from pathlib import Path
 from export.bundle import LICENCE, BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
+from export.prediction.expected_graph import EXPECTED
+from export.prediction.motion_pictures import HORIZONS
 from export.prediction.transformer_file import TransformerTables, read_transformer_file
 from export.prediction.transformer_graphs import CONTEXT, SLICES, head_name
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
-TRAINED_FPS = (10, 30)  # steps in time that the transformer was trained on
+FRAMES = 3  # before the one that is expected, which the parallel transformer sees; one made from motion may follow
+TRAINED_FPS = (10, 30)  # of the clips that transformers were trained on
 CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
     {"name": "Maquette clips: shapes, pushing (export.clips)", "licence": LICENCE, "used_for": "training, calibration"},
@@ -37,8 +40,8 @@ def frame_side(graphs: dict[str, Signature], slices: int, width: int, side: int)
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:
-    """Describes the graphs, `codes.maqc` and where it is there `transformer.maqr` that lie in `folder`, and writes
-    `manifest.json`, which it returns. Raises ValueError where they do not belong together."""
+    """Describes the graphs, `codes.maqc` and where they are there `transformer.maqr` and `expected.onnx` that lie in
+    `folder`, and writes `manifest.json`, which it returns. Raises ValueError where they do not belong together."""
     codes = read_code_file(folder / CODES)
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     slices, _, width = codes.entries.shape
@@ -50,6 +53,10 @@ def write_manifest(folder: Path, info: BundleInfo) -> dict:
         require_transformer(graphs, tables, codes)
         keys["transformer"] = {"file": TRANSFORMER, "fps": list(TRAINED_FPS)}
         files.append(TRANSFORMER)
+    if (folder / f"{EXPECTED}.onnx").exists():
+        graphs[EXPECTED] = signature_of(folder / f"{EXPECTED}.onnx")
+        seen = graphs[EXPECTED]["inputs"]["before"][1] // slices
+        keys[EXPECTED] = {"before": FRAMES, "frames": seen, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
     return write_bundle_manifest(folder, "prediction", info, graphs, files=files, task_keys=keys)
 
 

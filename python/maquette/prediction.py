@@ -12,7 +12,7 @@ import numpy as np
 from maquette.frames import Frame, Source, acquired_frame
 from maquette.native import NativeObject, native
 
-METHODS = ("auto", "last", "motion")  # of maq_prediction_method
+METHODS = ("auto", "last", "motion", "latent")  # of maq_prediction_method
 SURPRISE_METHODS = ("auto", "table")  # of maq_surprise_method
 
 

@@ -16,17 +16,35 @@ typedef struct maq_predictor maq_predictor;
 
 /* Values never change meaning; new ones are added at the end. */
 typedef enum maq_prediction_method {
-  MAQ_PREDICTION_AUTO = 0,  /* the others mixed, place by place, by how right each was there about the frames that have
-                               come, at that time ahead; the last frame until that is known, and while nothing moves */
-  MAQ_PREDICTION_LAST = 1,  /* the last frame, repeated */
-  MAQ_PREDICTION_MOTION = 2 /* everything moves on as it moved between the last two frames */
+  MAQ_PREDICTION_AUTO = 0,   /* the others mixed, place by place, by how right each was there about the frames that have
+                                come, at that time ahead; the last frame until that is known, and while nothing moves */
+  MAQ_PREDICTION_LAST = 1,   /* the last frame, repeated */
+  MAQ_PREDICTION_MOTION = 2, /* everything moves on as it moved between the last two frames */
+  MAQ_PREDICTION_LATENT = 3 /* what AUTO has, changed by what networks foresee, at 64 x 64 pixels, where anything moves.
+                               Of a predictor, not of a concealer; not in every bundle */
 } maq_prediction_method;
+
+/* Values never change meaning; new ones are added at the end. */
+typedef enum maq_latent_mode {
+  MAQ_LATENT_AUTO = 0,     /* MAQ_LATENT_EXPECTED where the bundle has it, else MAQ_LATENT_DRAWN */
+  MAQ_LATENT_EXPECTED = 1, /* the mean of what may come, in one pass of a network; it blurs what is uncertain */
+  MAQ_LATENT_DRAWN = 2     /* one of what may come, drawn code after code, in steps of at most 0.1 s; takes long */
+} maq_latent_mode;
 
 typedef struct maq_predictor_config {
   uint32_t struct_size;
   int32_t threads;              /* 1 to 64; 0 (default): the machine's large cores, at most 4 */
   maq_prediction_method method; /* default MAQ_PREDICTION_AUTO */
   uint32_t frame_pool_size;     /* predicted frames the app may hold at once, 1 to 64; default 4 */
+  /* Of MAQ_PREDICTION_LATENT alone: */
+  maq_latent_mode latent_mode; /* default MAQ_LATENT_AUTO */
+  const char* bundle_path; /* as of maq_surprise_config; default NULL, the bundle installed with the library. Copied. */
+  const maq_memory_file* bundle_files; /* default NULL. Copied. */
+  uint32_t bundle_file_count;          /* default 0 */
+  float
+      temperature; /* of codes that are drawn: 0 (default) takes the likeliest of each; 1 draws by the probabilities */
+  uint32_t top_k;  /* only so many of the likeliest; 0 (default): all */
+  uint64_t seed;   /* equal seeds draw equal frames, on one processor; default 0 */
 } maq_predictor_config;
 
 /* Times of the latest push and prediction, in wall-clock milliseconds, and counts since the predictor was made. */
@@ -45,6 +63,9 @@ typedef struct maq_predictor_stats {
   uint64_t pushed_count;
   uint64_t predicted_count;
   uint64_t reset_count; /* frames that did not go on from the one before, so that it was forgotten */
+  /* MAQ_PREDICTION_LATENT; all else is of what AUTO has: */
+  float networks_ms;    /* of the latest push or prediction; 0 where nothing moved, so that none ran */
+  uint32_t drawn_count; /* frames drawn for the latest prediction */
 } maq_predictor_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_predictor_config) of the caller.
@@ -53,7 +74,9 @@ MAQ_API maq_status maq_predictor_config_init(maq_predictor_config* config, uint3
 
 /* Makes a predictor for one stream. `config` may be NULL for the defaults. `*predictor` is the caller's, to be given to
  * maq_predictor_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. With MAQ_PREDICTION_LATENT a bundle of the task "prediction" is
+ * loaded and checked: MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_UNSUPPORTED (a bundle of another task, or
+ * without the networks of that mode), MAQ_ERROR_RUNTIME_LIBRARY; blocks while files are read. Else does not block. */
 MAQ_API maq_status maq_predictor_create(maq_context* context, const maq_predictor_config* config,
                                         maq_predictor** predictor);
 
@@ -65,15 +88,15 @@ MAQ_API void maq_predictor_destroy(maq_predictor* predictor);
  * timestamps, so that frames may be missing. The frames before are forgotten where this one is of another size, format
  * or clock, not later than they are or more than a second later, or shows something else (a cut); one of the same time
  * as the frame before replaces it.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (a depth image). Blocks while motion is
- * found. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (a depth image), MAQ_ERROR_INFERENCE.
+ * Blocks while motion is found, and while a network runs. */
 MAQ_API maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame* frame);
 
 /* Makes the picture that the stream will show `ahead_s` seconds after the latest frame, 0 to 10, in that frame's size
  * and format, with that time as its timestamp and that frame's sequence. While one frame is known, and while nothing
  * moves, it is that frame. `*frame` comes from a pool of frame_pool_size: give it back with maq_frame_release.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_POOL_EMPTY. Blocks while
- * pixels are computed. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_POOL_EMPTY,
+ * MAQ_ERROR_INFERENCE. Blocks while pixels are computed, and networks run. */
 MAQ_API maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_frame** frame);
 
 /* Forgets the frames so far, as before another stream.

@@ -1,20 +1,26 @@
 #include <atomic>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "api/boundary.h"
+#include "api/bundle_argument.h"
 #include "api/frame_handle.h"
 #include "api/source_handle.h"
 #include "core/worker_threads.h"
 #include "maquette/concealer.h"
 #include "pipeline/concealer.h"
+#include "prediction/latent/latent_predictor.h"
 #include "prediction/predictor.h"
 
 using namespace maq;
 
 struct maq_predictor : HandleOf<HandleKind::kPredictor> {
-  maq_predictor(const PredictorSettings& settings, size_t pool_size)
-      : predictor(settings), frames(pool_size, "predicted frames") {}
-  Predictor predictor;
+  maq_predictor(std::unique_ptr<Predictor> alone, std::unique_ptr<LatentPredictor> by_networks, size_t pool_size)
+      : predictor(std::move(alone)), latent(std::move(by_networks)), frames(pool_size, "predicted frames") {}
+  // One of these.
+  const std::unique_ptr<Predictor> predictor;
+  const std::unique_ptr<LatentPredictor> latent;
   BoundedPool<maq_frame> frames;
 };
 
@@ -29,6 +35,7 @@ struct maq_concealer : HandleOf<HandleKind::kConcealer> {
 
 namespace {
 
+constexpr char kPredictorBundle[] = "prediction-int8";
 constexpr const char* kConcealedTwice = "The source has a concealer already; destroy that first.";
 
 maq_concealer_config default_concealer_config() {
@@ -39,9 +46,10 @@ maq_concealer_config default_concealer_config() {
   return config;
 }
 
-PredictorSettings predictor_settings(int32_t threads, const maq_prediction_method& method) {
+PredictorSettings predictor_settings(int32_t threads, const maq_prediction_method& method,
+                                     maq_prediction_method last_method) {
   require_range("config.threads", threads, 0, kMaxThreads);
-  require_range("config.method", number_in(method), int32_t(MAQ_PREDICTION_AUTO), int32_t(MAQ_PREDICTION_MOTION));
+  require_range("config.method", number_in(method), int32_t(MAQ_PREDICTION_AUTO), int32_t(last_method));
   return {method, threads != 0 ? threads : default_threads()};
 }
 
@@ -50,6 +58,34 @@ maq_predictor_config default_predictor_config() {
   config.struct_size = sizeof config;
   config.frame_pool_size = 4;
   return config;
+}
+
+// Opens the networks of a mode. Throws what opening them throws, and MAQ_ERROR_UNSUPPORTED where the bundle has none.
+std::unique_ptr<LatentPredictor> latent_predictor(ContextState& state, const maq_predictor_config& config,
+                                                  int threads) {
+  require_range("config.latent_mode", number_in(config.latent_mode), int32_t(MAQ_LATENT_AUTO),
+                int32_t(MAQ_LATENT_DRAWN));
+  const CodeBundle bundle(read_bundle_argument(config, "config", kPredictorBundle));
+  SessionSettings session;
+  session.threads = threads;
+  LatentSettings settings;
+  settings.sampling = {config.temperature, config.top_k, config.seed};
+  settings.draws = config.latent_mode == MAQ_LATENT_DRAWN ||
+                   (config.latent_mode == MAQ_LATENT_AUTO && !ExpectedFrame::is_in(bundle));
+  if (settings.draws ? !TransformerBundle::is_in(bundle) : !ExpectedFrame::is_in(bundle)) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name,
+                " has no networks that foresee pictures so; use another bundle, latent_mode or method.");
+  }
+  LatentNetworks networks;
+  networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
+  networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
+  if (settings.draws) {
+    const CodeSampler checked(settings.sampling, bundle.codes->entries);
+    networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
+  } else {
+    networks.expected = std::make_shared<ExpectedFrame>(state.onnxruntime(), bundle, session);
+  }
+  return std::make_unique<LatentPredictor>(std::move(networks), settings, threads);
 }
 
 }  // namespace
@@ -65,8 +101,15 @@ maq_status maq_predictor_create(maq_context* context, const maq_predictor_config
     const maq_predictor_config config =
         read_config(given, "config", default_predictor_config(), sizeof(maq_predictor_config));
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings settings = predictor_settings(config.threads, config.method);
-    *predictor = new maq_predictor(settings, config.frame_pool_size);
+    const PredictorSettings settings = predictor_settings(config.threads, config.method, MAQ_PREDICTION_LATENT);
+    std::unique_ptr<Predictor> alone;
+    std::unique_ptr<LatentPredictor> by_networks;
+    if (config.method == MAQ_PREDICTION_LATENT) {
+      by_networks = latent_predictor(*context->state, config, settings.threads);
+    } else {
+      alone = std::make_unique<Predictor>(settings);
+    }
+    *predictor = new maq_predictor(std::move(alone), std::move(by_networks), config.frame_pool_size);
     return MAQ_OK;
   });
 }
@@ -76,7 +119,7 @@ void maq_predictor_destroy(maq_predictor* predictor) { destroy(predictor, "predi
 maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame* frame) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
     require_argument(frame, "frame");
-    predictor->predictor.push(frame->frame);
+    predictor->latent ? predictor->latent->push(frame->frame) : predictor->predictor->push(frame->frame);
     return MAQ_OK;
   });
 }
@@ -86,7 +129,9 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
     require_argument(frame, "frame");
     require_range("ahead_s", ahead_s, 0.0, double(Predictor::kMaxAhead_ns) / 1e9);
     BoundedPool<maq_frame>::Pooled handle = predictor->frames.acquire();
-    predictor->predictor.predict(int64_t(std::llround(ahead_s * 1e9)), handle->frame);
+    const int64_t ahead_ns = std::llround(ahead_s * 1e9);
+    predictor->latent ? predictor->latent->predict(ahead_ns, handle->frame)
+                      : predictor->predictor->predict(ahead_ns, handle->frame);
     *frame = lend<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
@@ -94,18 +139,20 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
 
 maq_status maq_predictor_reset(maq_predictor* predictor) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
-    predictor->predictor.reset();
+    predictor->latent ? predictor->latent->reset() : predictor->predictor->reset();
     return MAQ_OK;
   });
 }
 
 maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor_stats* stats) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
-    const PredictorStats& from = predictor->predictor.stats();
+    const LatentPredictor* const latent = predictor->latent.get();
+    const PredictorStats& from = latent != nullptr ? latent->stats() : predictor->predictor->stats();
     write_struct(stats, "stats",
                  maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms,
                                      from.fetch_ms, from.predict_ms, from.method, from.motion_fraction, from.pushed,
-                                     from.predicted, from.resets},
+                                     from.predicted, from.resets, latent != nullptr ? latent->networks_ms() : 0.0f,
+                                     latent != nullptr ? uint32_t(latent->steps()) : 0u},
                  sizeof(maq_predictor_stats));
     return MAQ_OK;
   });
@@ -125,7 +172,7 @@ maq_status maq_concealer_create(maq_context* context, maq_source* source, const 
         read_config(given, "config", default_concealer_config(), sizeof(maq_concealer_config));
     require_range("config.max_gap_ms", config.max_gap_ms, 1, 10000);
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings predictor = predictor_settings(config.threads, config.method);
+    const PredictorSettings predictor = predictor_settings(config.threads, config.method, MAQ_PREDICTION_MOTION);
     if (source->is_concealed->exchange(true)) {
       throw Error(MAQ_ERROR_BUSY, kConcealedTwice);
     }

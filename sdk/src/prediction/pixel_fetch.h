@@ -6,20 +6,9 @@
 #include <vector>
 
 #include "prediction/optical_flow.h"
+#include "prediction/plane_samples.h"
 
 namespace maq {
-
-// A plane of values in a frame: `channels` bytes, `channel_bytes` apart, of each of width x height pixels that lie
-// `pixel_bytes` apart; a pixel of it is `subsampled` pixels of the frame wide or high.
-struct PlaneSamples {
-  const uint8_t* from;
-  size_t from_stride;
-  uint8_t* to;
-  size_t to_stride;
-  int width, height;
-  int channels, channel_bytes, pixel_bytes;
-  int subsampled_x, subsampled_y;
-};
 
 // How much of each cell of a picture is fetched, the rest being what was there: 0 to 1, between cells interpolated.
 struct CellWeights {

@@ -55,6 +55,8 @@ class Predictor {
   void reset();
 
   bool has_frame() const { return has_frame_; }
+  // Whether anything moved between the two newest frames; not where that is not known.
+  bool moves() const { return moves_; }
   const PredictorStats& stats() const { return stats_; }
 
  private:

@@ -1,10 +1,11 @@
-"""Writes data/tiny_transformer: the bundle of data/tiny_prediction with a transformer of random weights, and what torch
+"""Writes data/tiny_transformer: the bundle of data/tiny_prediction with transformers of random weights, and what torch
 says of codes.
 
 `bundle`, and `rows_in_bytes.maqr`: its rows as bytes. `foreseen.f32`: little-endian [5][256][2], bits of each code of
 frames 1 to 5 of data/tiny_prediction given those before them, at 10 frames a second. `stream.f32`: [5][256], bits of a
 code as surprise has them from these, mean of the place. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
-likeliest given those before it.
+likeliest given those before it. `expected.f32`: [16][16][16], what the decoder is given of the frame that is expected
+0.4 s after frame 2, given frames 0 to 2, and as what motion foresees frame 3.
 
     python -m tests.native.generate.make_tiny_transformer
 """
@@ -12,6 +13,7 @@ likeliest given those before it.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from export.prediction.code_file import prior_of, read_code_file
 from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.graph_runtime import GraphRuntime
+from export.prediction.parallel import ParallelTransformer, times_ahead
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.transformer import UNSEEN, LatentTransformer
 from export.prediction.transformer_file import TransformerTables, transformer_bytes
@@ -49,8 +52,18 @@ def main() -> None:
             parameter.add_(0.15 * torch.randn_like(parameter))
         net.context.rows.weight[-1] = 0
         net.table.copy_(table.stacked())
+    parallel = ParallelTransformer(replace(SHAPE, motion=True)).eval()
+    with torch.no_grad():
+        for parameter in parallel.parameters():
+            parameter.add_(0.15 * torch.randn_like(parameter))
+        parallel.context.rows.weight[-1] = 0
+        before = codes[None, :4]
+        chances = parallel.expected(before, times_ahead(torch.tensor([FPS]), torch.tensor([4.0])))
+    entries = autoencoder.codebook.entries
+    mean = torch.cat([likely @ own for likely, own in zip(chances, entries, strict=True)], -1)
     bundle = FOLDER / "bundle"
-    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net)
+    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, parallel)
+    mean.numpy().astype("<f4").tofile(FOLDER / "expected.f32")
     tables = TransformerTables.of(net)
     write_whole(transformer_bytes(tables, row_bytes=1), FOLDER / "rows_in_bytes.maqr")
     stored = read_code_file(bundle / "codes.maqc")

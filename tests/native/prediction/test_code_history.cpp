@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "prediction/surprise/code_history.h"
+#include "prediction/transformer/code_history.h"
 
 namespace {
 

@@ -27,8 +27,8 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
-       "head/render", "prediction", "prediction/codes", "prediction/surprise", "prediction/transformer", "sources",
-       "sources/recording"}
+       "head/render", "prediction", "prediction/codes", "prediction/latent", "prediction/surprise",
+       "prediction/transformer", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
@@ -59,8 +59,9 @@ MAY_INCLUDE = {
     "head/wrap": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
     "prediction/codes": BASE,
-    "prediction/surprise": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
-    "prediction/transformer": BASE | {"prediction/codes"},
+    "prediction/latent": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
+    "prediction/surprise": BASE | {"prediction/codes", "prediction/transformer"},
+    "prediction/transformer": BASE | {"prediction", "prediction/codes"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,

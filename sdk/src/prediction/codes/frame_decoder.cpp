@@ -20,27 +20,47 @@ FrameDecoder::FrameDecoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, co
       settings_(settings),
       bytes_(bundle.bundle.files.at(graph_.file)) {}
 
-void FrameDecoder::run(const uint16_t* codes, uint8_t* rgb) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (session_ == nullptr) {
-    session_ = std::make_unique<Session>(runtime_, bytes_, graph_, name_, settings_);
-    bytes_ = {};
-  }
+void FrameDecoder::look_up(const uint16_t* codes) {
   const size_t width = codes_->width;
   features_.resize(codes_->count() * width);
   for (size_t i = 0; i < codes_->count(); ++i) {
     const size_t entry = i % codes_->slices * codes_->entries + codes[i];
     std::copy_n(codes_->vectors.data() + entry * width, width, features_.data() + i * width);
   }
+}
+
+const float* FrameDecoder::decode() {
+  if (session_ == nullptr) {
+    session_ = std::make_unique<Session>(runtime_, bytes_, graph_, name_, settings_);
+    bytes_ = {};
+  }
   inputs_.assign(1, {features_.data(), input_shape_});
   const float* const image = session_->run(inputs_, output_shapes_)[0].data;
-  const size_t values = size_t(frame_px_) * size_t(frame_px_) * 3;
-  if (!are_finite(image, values)) {
+  if (!are_finite(image, values())) {
     throw Error(MAQ_ERROR_INFERENCE,
                 "The decoder of frames gave numbers that are not finite. Install the bundle again.");
   }
-  std::transform(image, image + values, rgb,
+  return image;
+}
+
+void FrameDecoder::run(const uint16_t* codes, uint8_t* rgb) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  look_up(codes);
+  const float* const image = decode();
+  std::transform(image, image + values(), rgb,
                  [](float value) { return uint8_t(std::clamp(value, 0.0f, 255.0f) + 0.5f); });
+}
+
+void FrameDecoder::picture(const uint16_t* codes, float* rgb) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  look_up(codes);
+  std::copy_n(decode(), values(), rgb);
+}
+
+void FrameDecoder::picture(const float* features, float* rgb) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  features_.assign(features, features + codes_->count() * codes_->width);
+  std::copy_n(decode(), values(), rgb);
 }
 
 }  // namespace maq

@@ -24,8 +24,16 @@ class FrameDecoder {
   // `codes`: [places][slices], each below the number of entries. `rgb`: [frame_px][frame_px][3]. Throws what Session
   // throws, MAQ_ERROR_INFERENCE also where the network gives no finite numbers; `rgb` is then as before.
   void run(const uint16_t* codes, uint8_t* rgb);
+  // The same in float, not limited to 0..255; or of features as the encoder has them, [places][slices * width].
+  void picture(const uint16_t* codes, float* rgb);
+  void picture(const float* features, float* rgb);
 
  private:
+  // Of features_. The mutex is held.
+  const float* decode();
+  void look_up(const uint16_t* codes);
+  size_t values() const { return size_t(frame_px_) * size_t(frame_px_) * 3; }
+
   const std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   const std::shared_ptr<const FrameCodes> codes_;
   const int frame_px_;

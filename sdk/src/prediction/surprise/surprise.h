@@ -8,9 +8,9 @@
 
 #include "core/frame.h"
 #include "prediction/codes/frame_encoder.h"
-#include "prediction/surprise/code_history.h"
+#include "prediction/transformer/code_history.h"
 #include "prediction/surprise/code_surprise.h"
-#include "prediction/surprise/motion_codes.h"
+#include "prediction/transformer/motion_codes.h"
 #include "prediction/transformer/code_transformer.h"
 
 namespace maq {

@@ -1,4 +1,4 @@
-#include "prediction/surprise/code_history.h"
+#include "prediction/transformer/code_history.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "prediction/surprise/motion_codes.h"
+#include "prediction/transformer/motion_codes.h"
 
 #include <algorithm>
 #include <cstring>

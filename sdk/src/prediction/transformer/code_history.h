@@ -36,7 +36,7 @@ class CodeHistory {
     return {codes_.data() + slot * count_, times_ns_[slot]};
   }
 
-  const size_t count_;
+  size_t count_;
   std::vector<uint16_t> codes_;
   std::array<int64_t, kKept> times_ns_{};
   size_t next_ = 0, size_ = 0;

@@ -1,0 +1,235 @@
+// Coming frames by networks: what torch expects, what stays as it is, and differences in every format.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "image/convert.h"
+#include "prediction/latent/latent_predictor.h"
+#include "support/expect_error.h"
+#include "support/moving_texture.h"
+#include "support/tiny_transformer.h"
+
+namespace {
+
+std::shared_ptr<maq::ExpectedFrame> expected_frame(const std::string& bundle = tiny_transformer::kBundle) {
+  return std::make_shared<maq::ExpectedFrame>(tiny_prediction::runtime(), maq::CodeBundle(maq::read_bundle(bundle)),
+                                              maq::SessionSettings{});
+}
+
+maq::LatentNetworks networks() {
+  const maq::CodeBundle bundle(maq::read_bundle(tiny_transformer::kBundle));
+  maq::LatentNetworks all;
+  all.encoder = tiny_prediction::encoder(tiny_transformer::kBundle);
+  all.decoder = std::make_shared<maq::FrameDecoder>(tiny_prediction::runtime(), bundle, maq::SessionSettings{});
+  all.expected = expected_frame();
+  all.transformer = tiny_transformer::open();
+  return all;
+}
+
+maq::LatentPredictor predictor(bool draws) {
+  maq::LatentSettings settings;
+  settings.draws = draws;
+  return {networks(), settings, 1};
+}
+
+maq::Frame moving(int number, maq_pixel_format format = MAQ_PIXEL_BGR8) {
+  return moving_texture::frame(format, 160, 120, 2 * number, number, number * tiny_prediction::kFrame_ns);
+}
+
+std::vector<uint8_t> packed_pixels(const maq::Frame& frame) {
+  std::vector<uint8_t> pixels(maq::packed_bytes(frame.image.format, frame.image.width_px, frame.image.height_px));
+  maq::copy_packed(frame.image, pixels.data());
+  return pixels;
+}
+
+TEST(LatentPredictor, TheExpectedFrameIsThatOfTorch) {
+  const auto expected = expected_frame();
+  ASSERT_TRUE(expected->has_motion());
+  maq::ContextFrames frames = tiny_transformer::before(3).frames;
+  frames[3] = tiny_transformer::codes(3);
+  const std::vector<float> of_torch = tiny_transformer::floats_of("expected.f32");
+  std::vector<float> found(of_torch.size());
+  for (int again = 0; again < 2; ++again) {
+    expected->run(frames, 0.1f, 0.4f, found.data());
+    for (size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], of_torch[i], 1e-4) << i;
+  }
+  frames[3] = nullptr;
+  expected->run(frames, 0.1f, 0.4f, found.data());
+  EXPECT_NE(found, of_torch) << "without what motion foresees";
+  const std::vector<float> before = found;
+  expected->run(frames, 0.1f, 0.8f, found.data());
+  EXPECT_NE(found, before) << "another time";
+}
+
+TEST(LatentPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromTheirsOfIt) {
+  for (const bool draws : {false, true}) {
+    maq::LatentPredictor latent = predictor(draws);
+    maq::Predictor base({MAQ_PREDICTION_AUTO, 1});
+    const maq::LatentNetworks own = networks();
+    maq::MotionCodes motion(own.encoder);
+    std::vector<uint16_t> codes[4];
+    for (int number = 0; number < 4; ++number) {
+      const maq::Frame frame = tiny_prediction::frame(number);
+      latent.push(frame);
+      base.push(frame);
+      codes[number].resize(own.encoder->codes().count());
+      std::vector<uint8_t> squeezed(64 * 64 * 3);
+      own.encoder->run(frame.image, codes[number].data(), squeezed.data());
+      motion.add(squeezed.data(), frame.timestamp_ns);
+    }
+    ASSERT_TRUE(base.moves());
+    maq::Frame of_latent, of_base;
+    latent.predict(tiny_prediction::kFrame_ns, of_latent);
+    base.predict(tiny_prediction::kFrame_ns, of_base);
+    std::vector<float> made(64 * 64 * 3), of_theirs(made.size()), features(256 * 16);
+    maq::CodesBefore before;
+    for (size_t i = 0; i < 3; ++i) before.frames[i] = codes[i + 1].data();
+    before.newest = codes[3].data();
+    before.step_s = 0.1f;
+    std::vector<uint16_t> found(codes[3].size());
+    if (draws) {
+      own.transformer->draw(before, {}, 1, 0, 1, found.data());
+      own.decoder->picture(found.data(), made.data());
+    } else {
+      before.frames[3] = motion.at(4 * tiny_prediction::kFrame_ns, codes[3].data());
+      own.expected->run(before.frames, 0.1f, 0.1f, features.data());
+      own.decoder->picture(features.data(), made.data());
+    }
+    own.encoder->run(of_base.image, found.data());
+    own.decoder->picture(found.data(), of_theirs.data());
+    const std::vector<uint8_t> from = packed_pixels(of_base), to = packed_pixels(of_latent);
+    int changed = 0;
+    for (size_t i = 0; i < to.size(); ++i) {
+      const float sum = std::clamp(float(from[i]) + made[i] - of_theirs[i], 0.0f, 255.0f);
+      ASSERT_NEAR(float(to[i]), sum, 0.51f) << i;
+      changed += from[i] != to[i] ? 1 : 0;
+    }
+    EXPECT_GT(changed, 1000);
+    EXPECT_EQ(latent.steps(), draws ? 1u : 0u);
+    EXPECT_GT(latent.networks_ms(), 0);
+    EXPECT_TRUE(of_latent.origin.is_predicted);
+  }
+}
+
+TEST(LatentPredictor, WhereNothingMovesItIsTheLastFrame) {
+  for (const bool draws : {false, true}) {
+    maq::LatentPredictor latent = predictor(draws);
+    maq::Frame shown = moving(0), predicted;
+    for (int number = 0; number < 4; ++number) {
+      shown.timestamp_ns = number * tiny_prediction::kFrame_ns;
+      latent.push(shown);
+      for (const int64_t ahead_ns : {int64_t(0), tiny_prediction::kFrame_ns, 100 * tiny_prediction::kFrame_ns}) {
+        latent.predict(ahead_ns, predicted);
+        EXPECT_EQ(packed_pixels(predicted), packed_pixels(shown));
+        EXPECT_EQ(latent.networks_ms(), 0);
+      }
+    }
+  }
+}
+
+TEST(LatentPredictor, EveryFormatIsChangedAlike) {
+  maq::PictureDifference difference;
+  maq::WorkerThreads threads(2);
+  std::vector<float> change(8 * 8 * 3);
+  for (size_t i = 0; i < change.size(); ++i) change[i] = float(i % 3) * 8 - 10 + 12 * float(i / 24) / 8;
+  for (const auto format :
+       {MAQ_PIXEL_RGB8, MAQ_PIXEL_BGR8, MAQ_PIXEL_RGBA8, MAQ_PIXEL_GREY8, MAQ_PIXEL_NV12, MAQ_PIXEL_YUYV}) {
+    // Odd sizes too, and smaller than the difference.
+    for (const auto& [width, height] : {std::pair{160, 120}, {33, 17}, {5, 3}, {1, 1}}) {
+      maq::Frame frame = moving_texture::frame(format, width, height, 3, 1, 0);
+      maq::Frame before = moving_texture::frame(format, width, height, 3, 1, 0);
+      difference.add(change.data(), 8, frame.image, threads, frame.storage.data());
+      std::vector<uint8_t> one(size_t(width) * size_t(height) * 3), other(one.size());
+      maq::copy_pixels(before.image, MAQ_PIXEL_BGR8, one.data(), 0, one.size());
+      maq::copy_pixels(frame.image, MAQ_PIXEL_BGR8, other.data(), 0, other.size());
+      double error = 0;
+      for (int y = 0; y < height; ++y) {
+        const float at_y = std::clamp((float(y) + 0.5f) * 8 / float(height) - 0.5f, 0.0f, 7.0f);
+        for (int x = 0; x < width; ++x) {
+          float rgb[3] = {-10 + 12 * at_y / 8, -2 + 12 * at_y / 8, 6 + 12 * at_y / 8};
+          if (format == MAQ_PIXEL_GREY8) {
+            rgb[0] = rgb[1] = rgb[2] = 0.299f * rgb[0] + 0.587f * rgb[1] + 0.114f * rgb[2];
+          }
+          for (int c = 0; c < 3; ++c) {
+            const size_t i = (size_t(y) * size_t(width) + size_t(x)) * 3 + size_t(2 - c);
+            const float sum = std::clamp(float(one[i]) + rgb[c], 0.0f, 255.0f);
+            error += std::abs(double(float(other[i]) - sum)) / double(one.size());
+          }
+        }
+      }
+      EXPECT_LT(error, 1.6) << int(format) << " " << width;
+    }
+  }
+}
+
+TEST(LatentPredictor, LessThanHalfALevelChangesNothingAndBytesDoNotOverflow) {
+  maq::PictureDifference difference;
+  maq::WorkerThreads threads(1);
+  maq::Frame frame = moving(3), before = moving(3);
+  const std::vector<float> little(64 * 64 * 3, 0.49f), much(64 * 64 * 3, 300.0f), less(64 * 64 * 3, -300.0f);
+  difference.add(little.data(), 64, frame.image, threads, frame.storage.data());
+  EXPECT_EQ(packed_pixels(frame), packed_pixels(before));
+  difference.add(much.data(), 64, frame.image, threads, frame.storage.data());
+  EXPECT_EQ(packed_pixels(frame), std::vector<uint8_t>(160 * 120 * 3, 255));
+  difference.add(less.data(), 64, frame.image, threads, frame.storage.data());
+  EXPECT_EQ(packed_pixels(frame), std::vector<uint8_t>(160 * 120 * 3, 0));
+}
+
+TEST(LatentPredictor, NothingOfTheSceneBeforeACutOrAResetIsUsed) {
+  for (const bool by_reset : {false, true}) {
+    maq::LatentPredictor latent = predictor(false), fresh = predictor(false);
+    for (int number = 0; number < 5; ++number) latent.push(moving(number));
+    maq::Frame white = moving(5);
+    std::fill(white.storage.begin(), white.storage.end(), uint8_t(255));
+    if (by_reset) latent.reset();
+    latent.push(white);
+    fresh.push(white);
+    for (int number = 6; number < 9; ++number) {
+      const maq::Frame other =
+          moving_texture::frame(MAQ_PIXEL_BGR8, 160, 120, 900 - 2 * number, 700, number * tiny_prediction::kFrame_ns);
+      latent.push(other);
+      fresh.push(other);
+      maq::Frame one, two;
+      latent.predict(tiny_prediction::kFrame_ns, one);
+      fresh.predict(tiny_prediction::kFrame_ns, two);
+      EXPECT_EQ(packed_pixels(one), packed_pixels(two)) << by_reset << " " << number;
+    }
+  }
+}
+
+TEST(LatentPredictor, FramesFarAheadAreDrawnInSteps) {
+  maq::LatentPredictor latent = predictor(true);
+  for (int number = 0; number < 4; ++number) latent.push(moving(number, MAQ_PIXEL_NV12));
+  maq::Frame frame;
+  for (const auto& [ahead_ns, steps] :
+       {std::pair<int64_t, size_t>{33333333, 1}, {100000000, 1}, {100000001, 2}, {250000000, 3}}) {
+    latent.predict(ahead_ns, frame);
+    EXPECT_EQ(latent.steps(), steps);
+  }
+}
+
+TEST(LatentPredictor, BundlesWhoseExpectedFrameIsNotWhatItShouldBeAreRefused) {
+  TempFolder folder;
+  std::filesystem::copy(tiny_transformer::kBundle, folder.path(), std::filesystem::copy_options::recursive);
+  const auto manifest = nlohmann::json::parse(read_text(tiny_transformer::kBundle + "/manifest.json"));
+  const auto refused = [&](const char* text, auto&& change) {
+    nlohmann::json changed = manifest;
+    change(changed);
+    write_text(folder.file("manifest.json"), changed.dump());
+    expect_error(MAQ_ERROR_BAD_BUNDLE, text, [&] { expected_frame(folder.path().string()); });
+  };
+  for (const char* key : {"before", "frames", "max_ahead", "fps"}) {
+    refused(key, [&](nlohmann::json& changed) { changed["expected"].erase(key); });
+    refused(key, [&](nlohmann::json& changed) { changed["expected"][key] = 0; });
+  }
+  refused("fps", [](nlohmann::json& changed) { changed["expected"]["fps"] = {30, 10}; });
+  refused("graph expected", [](nlohmann::json& changed) { changed["expected"]["frames"] = 3; });
+  refused("expected", [](nlohmann::json& changed) { changed["graphs"].erase("expected"); });
+  for (const char* side : {"inputs", "outputs"}) {
+    refused("graph expected", [&](nlohmann::json& changed) { changed["graphs"]["expected"][side][0]["name"] = "x"; });
+    refused("graph expected", [&](nlohmann::json& changed) { changed["graphs"]["expected"][side][0]["shape"][1] = 9; });
+  }
+}
+
+}  // namespace

@@ -24,8 +24,10 @@ from export.prediction.bundle import CODES, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
-from export.prediction.expected_graph import EXPECTED
+from export.prediction.graphs.expected_graph import EXPECTED
+from export.prediction.pictures.mended_graph import MENDED
 from export.prediction.pictures.picture_error import psnr_db
+from quantization.mended import mended_cost, mended_samples
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
@@ -92,8 +94,17 @@ def main() -> None:
     held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)
     options.out.mkdir(parents=True, exist_ok=True)
     given = samples(options.fp32, calibrating, codes), samples(options.fp32, held_out, codes)
-    quality = quantize_graphs(options.fp32, options.out, settings.graphs, *given)
+    truth = None
+    if (options.fp32 / f"{MENDED}.onnx").exists():
+        before = read_manifest(options.fp32)[MENDED]["before"]
+        for own, split, count in zip(given, ("train", "val"), (settings.frames, settings.held_out_frames), strict=True):
+            own[MENDED], truth = mended_samples(options.data, options.sets, split, count, before)
+    graphs = {name: own for name, own in settings.graphs.items() if name in given[0]}
+    (options.out / f"{MENDED}.onnx").unlink(missing_ok=True)  # of an earlier bundle
+    quality = quantize_graphs(options.fp32, options.out, graphs, *given)
     measured = cost(options.fp32, options.out, held_out, codes)
+    if truth is not None:
+        measured |= mended_cost(options.fp32, options.out, given[1][MENDED], truth)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
     for name in (TRANSFORMER, f"{EXPECTED}.onnx"):  # of an earlier bundle

@@ -96,9 +96,10 @@ class HeadSettings:
 
 @dataclass(frozen=True)
 class PredictionSettings:
-    """graphs: settings by graph name. frames, held_out_frames: how many frames calibrate, and measure the error."""
+    """graphs: settings by graph name, also of graphs that only some bundles have. frames, held_out_frames: how many
+    frames calibrate, and measure the error."""
 
-    GRAPHS: ClassVar[tuple[str, ...]] = prediction.GRAPHS
+    GRAPHS: ClassVar[tuple[str, ...]] = (*prediction.GRAPHS, prediction.MENDED)
 
     graphs: dict[str, GraphSettings]
     frames: int

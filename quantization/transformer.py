@@ -17,10 +17,10 @@ from export.prediction.bundle import CODES, TRANSFORMER, transformer_graphs
 from export.prediction.code_file import prior_of, read_code_file
 from export.prediction.codes import CodedClips
 from export.prediction.config import TransformerShape
-from export.prediction.expected_graph import EXPECTED
-from export.prediction.graph_runtime import GraphRuntime
+from export.prediction.graphs.expected_graph import EXPECTED
+from export.prediction.graphs.graph_runtime import GraphRuntime
+from export.prediction.graphs.transformer_file import read_transformer_file, transformer_bytes
 from export.prediction.train_transformer import examples, held_out_frames
-from export.prediction.transformer_file import read_transformer_file, transformer_bytes
 from quantization.graphs.stored_bytes import store_as_bytes
 
 

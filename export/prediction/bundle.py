@@ -8,10 +8,11 @@ from pathlib import Path
 from export.bundle import LICENCE, BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
-from export.prediction.expected_graph import EXPECTED
+from export.prediction.graphs.expected_graph import EXPECTED
+from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
+from export.prediction.graphs.transformer_graphs import CONTEXT, SLICES, head_name
 from export.prediction.motion_pictures import HORIZONS
-from export.prediction.transformer_file import TransformerTables, read_transformer_file
-from export.prediction.transformer_graphs import CONTEXT, SLICES, head_name
+from export.prediction.pictures.mended_graph import MENDED
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
@@ -40,8 +41,9 @@ def frame_side(graphs: dict[str, Signature], slices: int, width: int, side: int)
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:
-    """Describes the graphs, `codes.maqc` and where they are there `transformer.maqr` and `expected.onnx` that lie in
-    `folder`, and writes `manifest.json`, which it returns. Raises ValueError where they do not belong together."""
+    """Describes the graphs, `codes.maqc` and where they are there `transformer.maqr`, `expected.onnx` and `mended.onnx`
+    that lie in `folder`, and writes `manifest.json`, which it returns. Raises ValueError where they do not belong
+    together."""
     codes = read_code_file(folder / CODES)
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     slices, _, width = codes.entries.shape
@@ -53,6 +55,10 @@ def write_manifest(folder: Path, info: BundleInfo) -> dict:
         require_transformer(graphs, tables, codes)
         keys["transformer"] = {"file": TRANSFORMER, "fps": list(TRAINED_FPS)}
         files.append(TRANSFORMER)
+    if (folder / f"{MENDED}.onnx").exists():
+        graphs[MENDED] = signature_of(folder / f"{MENDED}.onnx")
+        before = graphs[MENDED]["inputs"]["pictures"][3] // 3 - 1
+        keys[MENDED] = {"before": before, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
     if (folder / f"{EXPECTED}.onnx").exists():
         graphs[EXPECTED] = signature_of(folder / f"{EXPECTED}.onnx")
         seen = graphs[EXPECTED]["inputs"]["before"][1] // slices

@@ -2,7 +2,7 @@
 
     python -m export.prediction.export_transformer --weights .data/runs/prediction-transformer/weights.pt
 
-The graphs are those of `transformer_graphs.py`; what a runtime does around them is in `graph_runtime.py`.
+The graphs are those of `graphs/transformer_graphs.py`; what a runtime does around them is in `graphs/graph_runtime.py`.
 `export_onnx --transformer` puts them into a bundle.
 """
 
@@ -16,11 +16,11 @@ import torch
 
 from export.onnx_graphs import largest_difference
 from export.prediction.config import CODE_SIDE
-from export.prediction.graph_runtime import GraphRuntime
+from export.prediction.graphs.graph_runtime import GraphRuntime
+from export.prediction.graphs.transformer_file import TransformerTables
+from export.prediction.graphs.transformer_graphs import write_transformer_graphs
 from export.prediction.train_transformer import load_transformer
 from export.prediction.transformer import LatentTransformer
-from export.prediction.transformer_file import TransformerTables
-from export.prediction.transformer_graphs import write_transformer_graphs
 
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the largest logit
 _FPS = 15.0

@@ -12,16 +12,17 @@ import numpy as np
 from maquette.frames import Frame, Source, acquired_frame
 from maquette.native import NativeObject, native
 
-METHODS = ("auto", "last", "motion", "latent")  # of maq_prediction_method
+METHODS = ("auto", "last", "motion", "network")  # of maq_prediction_method
 SURPRISE_METHODS = ("auto", "table")  # of maq_surprise_method
 
 
 class Predictor(NativeObject):
     """Gets the frames of a stream as they come, and makes pictures of what it will show a while later.
 
-    method: "motion" (everything moves on as it moved), "last" (the last frame), or "auto": both mixed, place by place,
-    by how right each was about the frames that have come. settings: fields of maq_predictor_config by their names. It
-    sees pictures, not the world: never steer anything by what it made up.
+    method: "motion" (everything moves on as it moved), "last" (the last frame), "auto": both mixed, place by place, by
+    how right each was about the frames that have come, or "network": that, changed by what networks foresee (not in
+    every bundle). settings: fields of maq_predictor_config by their names. It sees pictures, not the world: never steer
+    anything by what it made up.
     """
 
     def __init__(self, method: str = "auto", **settings: Any) -> None:

@@ -20,24 +20,25 @@ typedef enum maq_prediction_method {
                                 come, at that time ahead; the last frame until that is known, and while nothing moves */
   MAQ_PREDICTION_LAST = 1,   /* the last frame, repeated */
   MAQ_PREDICTION_MOTION = 2, /* everything moves on as it moved between the last two frames */
-  MAQ_PREDICTION_LATENT = 3 /* what AUTO has, changed by what networks foresee, at 64 x 64 pixels, where anything moves.
-                               Of a predictor, not of a concealer; not in every bundle */
+  MAQ_PREDICTION_NETWORK = 3 /* what AUTO has, changed by what networks foresee, at 64 x 64 pixels, where anything
+                               moves. Of a predictor, not of a concealer; not in every bundle */
 } maq_prediction_method;
 
 /* Values never change meaning; new ones are added at the end. */
-typedef enum maq_latent_mode {
-  MAQ_LATENT_AUTO = 0,     /* MAQ_LATENT_EXPECTED where the bundle has it, else MAQ_LATENT_DRAWN */
-  MAQ_LATENT_EXPECTED = 1, /* the mean of what may come, in one pass of a network; it blurs what is uncertain */
-  MAQ_LATENT_DRAWN = 2     /* one of what may come, drawn code after code, in steps of at most 0.1 s; takes long */
-} maq_latent_mode;
+typedef enum maq_network_mode {
+  MAQ_NETWORK_AUTO = 0,     /* the first of these that the bundle has */
+  MAQ_NETWORK_MENDED = 1,   /* what motion foresees, mended by a network that sees the frames before as well */
+  MAQ_NETWORK_EXPECTED = 2, /* the mean of the codes that may come, in one pass; it blurs what is uncertain */
+  MAQ_NETWORK_DRAWN = 3     /* one of what may come, drawn code after code, in steps of at most 0.1 s; takes long */
+} maq_network_mode;
 
 typedef struct maq_predictor_config {
   uint32_t struct_size;
   int32_t threads;              /* 1 to 64; 0 (default): the machine's large cores, at most 4 */
   maq_prediction_method method; /* default MAQ_PREDICTION_AUTO */
   uint32_t frame_pool_size;     /* predicted frames the app may hold at once, 1 to 64; default 4 */
-  /* Of MAQ_PREDICTION_LATENT alone: */
-  maq_latent_mode latent_mode; /* default MAQ_LATENT_AUTO */
+  /* Of MAQ_PREDICTION_NETWORK alone: */
+  maq_network_mode network_mode; /* default MAQ_NETWORK_AUTO */
   const char* bundle_path; /* as of maq_surprise_config; default NULL, the bundle installed with the library. Copied. */
   const maq_memory_file* bundle_files; /* default NULL. Copied. */
   uint32_t bundle_file_count;          /* default 0 */
@@ -63,7 +64,7 @@ typedef struct maq_predictor_stats {
   uint64_t pushed_count;
   uint64_t predicted_count;
   uint64_t reset_count; /* frames that did not go on from the one before, so that it was forgotten */
-  /* MAQ_PREDICTION_LATENT; all else is of what AUTO has: */
+  /* MAQ_PREDICTION_NETWORK; all else is of what AUTO has: */
   float networks_ms;    /* of the latest push or prediction; 0 where nothing moved, so that none ran */
   uint32_t drawn_count; /* frames drawn for the latest prediction */
 } maq_predictor_stats;
@@ -74,7 +75,7 @@ MAQ_API maq_status maq_predictor_config_init(maq_predictor_config* config, uint3
 
 /* Makes a predictor for one stream. `config` may be NULL for the defaults. `*predictor` is the caller's, to be given to
  * maq_predictor_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. With MAQ_PREDICTION_LATENT a bundle of the task "prediction" is
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. With MAQ_PREDICTION_NETWORK a bundle of the task "prediction" is
  * loaded and checked: MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_UNSUPPORTED (a bundle of another task, or
  * without the networks of that mode), MAQ_ERROR_RUNTIME_LIBRARY; blocks while files are read. Else does not block. */
 MAQ_API maq_status maq_predictor_create(maq_context* context, const maq_predictor_config* config,

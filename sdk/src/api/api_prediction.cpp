@@ -10,17 +10,17 @@
 #include "core/worker_threads.h"
 #include "maquette/concealer.h"
 #include "pipeline/concealer.h"
-#include "prediction/latent/latent_predictor.h"
+#include "prediction/networks/network_predictor.h"
 #include "prediction/predictor.h"
 
 using namespace maq;
 
 struct maq_predictor : HandleOf<HandleKind::kPredictor> {
-  maq_predictor(std::unique_ptr<Predictor> alone, std::unique_ptr<LatentPredictor> by_networks, size_t pool_size)
-      : predictor(std::move(alone)), latent(std::move(by_networks)), frames(pool_size, "predicted frames") {}
+  maq_predictor(std::unique_ptr<Predictor> alone, std::unique_ptr<NetworkPredictor> by_networks, size_t pool_size)
+      : predictor(std::move(alone)), by_network(std::move(by_networks)), frames(pool_size, "predicted frames") {}
   // One of these.
   const std::unique_ptr<Predictor> predictor;
-  const std::unique_ptr<LatentPredictor> latent;
+  const std::unique_ptr<NetworkPredictor> by_network;
   BoundedPool<maq_frame> frames;
 };
 
@@ -61,31 +61,47 @@ maq_predictor_config default_predictor_config() {
 }
 
 // Opens the networks of a mode. Throws what opening them throws, and MAQ_ERROR_UNSUPPORTED where the bundle has none.
-std::unique_ptr<LatentPredictor> latent_predictor(ContextState& state, const maq_predictor_config& config,
-                                                  int threads) {
-  require_range("config.latent_mode", number_in(config.latent_mode), int32_t(MAQ_LATENT_AUTO),
-                int32_t(MAQ_LATENT_DRAWN));
+std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const maq_predictor_config& config,
+                                                    int threads) {
+  require_range("config.network_mode", number_in(config.network_mode), int32_t(MAQ_NETWORK_AUTO),
+                int32_t(MAQ_NETWORK_DRAWN));
   const CodeBundle bundle(read_bundle_argument(config, "config", kPredictorBundle));
   SessionSettings session;
   session.threads = threads;
-  LatentSettings settings;
-  settings.sampling = {config.temperature, config.top_k, config.seed};
-  settings.draws = config.latent_mode == MAQ_LATENT_DRAWN ||
-                   (config.latent_mode == MAQ_LATENT_AUTO && !ExpectedFrame::is_in(bundle));
-  if (settings.draws ? !TransformerBundle::is_in(bundle) : !ExpectedFrame::is_in(bundle)) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name,
-                " has no networks that foresee pictures so; use another bundle, latent_mode or method.");
+  maq_network_mode mode = config.network_mode;
+  if (mode == MAQ_NETWORK_AUTO) {
+    mode = MendedPicture::is_in(bundle)   ? MAQ_NETWORK_MENDED
+           : ExpectedFrame::is_in(bundle) ? MAQ_NETWORK_EXPECTED
+                                          : MAQ_NETWORK_DRAWN;
   }
-  LatentNetworks networks;
+  const bool is_there = mode == MAQ_NETWORK_MENDED     ? MendedPicture::is_in(bundle)
+                        : mode == MAQ_NETWORK_EXPECTED ? ExpectedFrame::is_in(bundle)
+                                                       : TransformerBundle::is_in(bundle);
+  if (!is_there) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name,
+                " has no networks that foresee pictures so; use another bundle, network_mode or method.");
+  }
+  NetworkSettings settings;
+  settings.sampling = {config.temperature, config.top_k, config.seed};
+  PredictionNetworks networks;
   networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
   networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
-  if (settings.draws) {
-    const CodeSampler checked(settings.sampling, bundle.codes->entries);
-    networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
-  } else {
-    networks.expected = std::make_shared<ExpectedFrame>(state.onnxruntime(), bundle, session);
+  switch (mode) {
+    case MAQ_NETWORK_DRAWN: {
+      const CodeSampler checked(settings.sampling, bundle.codes->entries);
+      settings.mode = NetworkMode::kDrawn;
+      networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
+      break;
+    }
+    case MAQ_NETWORK_EXPECTED:
+      settings.mode = NetworkMode::kExpected;
+      networks.expected = std::make_shared<ExpectedFrame>(state.onnxruntime(), bundle, session);
+      break;
+    default:
+      settings.mode = NetworkMode::kMended;
+      networks.mended = std::make_shared<MendedPicture>(state.onnxruntime(), bundle, session);
   }
-  return std::make_unique<LatentPredictor>(std::move(networks), settings, threads);
+  return std::make_unique<NetworkPredictor>(std::move(networks), settings, threads);
 }
 
 }  // namespace
@@ -101,11 +117,11 @@ maq_status maq_predictor_create(maq_context* context, const maq_predictor_config
     const maq_predictor_config config =
         read_config(given, "config", default_predictor_config(), sizeof(maq_predictor_config));
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings settings = predictor_settings(config.threads, config.method, MAQ_PREDICTION_LATENT);
+    const PredictorSettings settings = predictor_settings(config.threads, config.method, MAQ_PREDICTION_NETWORK);
     std::unique_ptr<Predictor> alone;
-    std::unique_ptr<LatentPredictor> by_networks;
-    if (config.method == MAQ_PREDICTION_LATENT) {
-      by_networks = latent_predictor(*context->state, config, settings.threads);
+    std::unique_ptr<NetworkPredictor> by_networks;
+    if (config.method == MAQ_PREDICTION_NETWORK) {
+      by_networks = network_predictor(*context->state, config, settings.threads);
     } else {
       alone = std::make_unique<Predictor>(settings);
     }
@@ -119,7 +135,7 @@ void maq_predictor_destroy(maq_predictor* predictor) { destroy(predictor, "predi
 maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame* frame) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
     require_argument(frame, "frame");
-    predictor->latent ? predictor->latent->push(frame->frame) : predictor->predictor->push(frame->frame);
+    predictor->by_network ? predictor->by_network->push(frame->frame) : predictor->predictor->push(frame->frame);
     return MAQ_OK;
   });
 }
@@ -130,8 +146,8 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
     require_range("ahead_s", ahead_s, 0.0, double(Predictor::kMaxAhead_ns) / 1e9);
     BoundedPool<maq_frame>::Pooled handle = predictor->frames.acquire();
     const int64_t ahead_ns = std::llround(ahead_s * 1e9);
-    predictor->latent ? predictor->latent->predict(ahead_ns, handle->frame)
-                      : predictor->predictor->predict(ahead_ns, handle->frame);
+    predictor->by_network ? predictor->by_network->predict(ahead_ns, handle->frame)
+                          : predictor->predictor->predict(ahead_ns, handle->frame);
     *frame = lend<maq_frame>(std::move(handle));
     return MAQ_OK;
   });
@@ -139,21 +155,22 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
 
 maq_status maq_predictor_reset(maq_predictor* predictor) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
-    predictor->latent ? predictor->latent->reset() : predictor->predictor->reset();
+    predictor->by_network ? predictor->by_network->reset() : predictor->predictor->reset();
     return MAQ_OK;
   });
 }
 
 maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor_stats* stats) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
-    const LatentPredictor* const latent = predictor->latent.get();
-    const PredictorStats& from = latent != nullptr ? latent->stats() : predictor->predictor->stats();
-    write_struct(stats, "stats",
-                 maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms,
-                                     from.fetch_ms, from.predict_ms, from.method, from.motion_fraction, from.pushed,
-                                     from.predicted, from.resets, latent != nullptr ? latent->networks_ms() : 0.0f,
-                                     latent != nullptr ? uint32_t(latent->steps()) : 0u},
-                 sizeof(maq_predictor_stats));
+    const NetworkPredictor* const by_network = predictor->by_network.get();
+    const PredictorStats& from = by_network != nullptr ? by_network->stats() : predictor->predictor->stats();
+    write_struct(
+        stats, "stats",
+        maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
+                            from.predict_ms, from.method, from.motion_fraction, from.pushed, from.predicted,
+                            from.resets, by_network != nullptr ? by_network->networks_ms() : 0.0f,
+                            by_network != nullptr ? uint32_t(by_network->steps()) : 0u},
+        sizeof(maq_predictor_stats));
     return MAQ_OK;
   });
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <maquette/maquette.hpp>
 #include <string>
@@ -54,6 +55,70 @@ TEST_F(ApiPrediction, AFramePredictedIsOneOfTheStreamAndSaysThatItIsMadeUp) {
   EXPECT_EQ(stats.reset_count, 0u);
   EXPECT_GT(stats.push_ms, 0);
   EXPECT_GT(stats.predict_ms, 0);
+}
+
+std::vector<uint8_t> bytes_of(const maquette::Frame& frame) {
+  std::vector<uint8_t> bytes(320 * 240 * 3);
+  frame.copy_pixels(MAQ_PIXEL_BGR8, bytes.data(), 0, bytes.size());
+  return bytes;
+}
+
+maq_predictor_config network_config(maq_network_mode mode) {
+  maq_predictor_config config;
+  maquette::check(maq_predictor_config_init(&config, sizeof config));
+  config.method = MAQ_PREDICTION_NETWORK;
+  config.network_mode = mode;
+  config.bundle_path = MAQ_TEST_DATA "/tiny_transformer/bundle";
+  config.threads = 1;
+  return config;
+}
+
+TEST_F(ApiPrediction, ByNetworksItIsAnotherPictureOfTheSameTimeAndSize) {
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
+  maquette::Predictor automatic(context_), mended(context_, network_config(MAQ_NETWORK_AUTO)),
+      expected(context_, network_config(MAQ_NETWORK_EXPECTED)), drawn(context_, network_config(MAQ_NETWORK_DRAWN));
+  while (const auto frame = source.next()) {
+    for (maquette::Predictor* const predictor : {&automatic, &mended, &expected, &drawn}) predictor->push(*frame);
+  }
+  const maquette::Frame base = automatic.predict(0.25), by_mended = mended.predict(0.25),
+                        by_expected = expected.predict(0.25), by_drawn = drawn.predict(0.25);
+  EXPECT_NE(bytes_of(by_mended), bytes_of(by_expected));
+  for (const maquette::Frame* const frame : {&by_mended, &by_expected, &by_drawn}) {
+    EXPECT_EQ(frame->desc().width_px, 320);
+    EXPECT_EQ(frame->desc().format, base.desc().format);
+    EXPECT_EQ(frame->origin().horizon_ns, 250000000);
+    EXPECT_NE(bytes_of(*frame), bytes_of(base));
+  }
+  EXPECT_EQ(expected.stats().drawn_count, 0u);
+  EXPECT_EQ(drawn.stats().drawn_count, 3u);
+  EXPECT_GT(expected.stats().networks_ms, 0);
+  EXPECT_EQ(automatic.stats().networks_ms, 0);
+  EXPECT_EQ(drawn.stats().pushed_count, 5u);
+  drawn.reset();
+  EXPECT_THROW(drawn.predict(0.1), maquette::Error);
+}
+
+TEST_F(ApiPrediction, NetworksThatABundleDoesNotHaveAndDrawsOutOfRangeAreRefused) {
+  maq_predictor* made = nullptr;
+  const auto refused = [&](const char* name, maq_status status, auto&& change) {
+    maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+    change(config);
+    EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), status) << name;
+    EXPECT_NE(text().find(name), std::string::npos) << text();
+    EXPECT_EQ(made, nullptr);
+  };
+  refused("no networks", MAQ_ERROR_UNSUPPORTED,
+          [](maq_predictor_config& config) { config.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle"; });
+  refused("/nowhere", MAQ_ERROR_NOT_FOUND, [](maq_predictor_config& config) { config.bundle_path = "/nowhere"; });
+  for (const float temperature : {-1.0f, std::nanf("")}) {
+    refused("temperature", MAQ_ERROR_INVALID_ARGUMENT,
+            [&](maq_predictor_config& config) { config.temperature = temperature; });
+  }
+  refused("top_k", MAQ_ERROR_INVALID_ARGUMENT, [](maq_predictor_config& config) { config.top_k = 17; });
+  refused("network_mode", MAQ_ERROR_INVALID_ARGUMENT, [](maq_predictor_config& config) {
+    const int unknown = 4;
+    std::memcpy(&config.network_mode, &unknown, sizeof unknown);
+  });
 }
 
 TEST_F(ApiPrediction, TheAgeOfALiveFrameGrows) {
@@ -209,7 +274,7 @@ TEST_F(ApiPrediction, ConfigsAndStructsOutOfRangeAreRefused) {
   refused("threads", [](maq_predictor_config& config) { config.threads = -1; });
   refused("threads", [](maq_predictor_config& config) { config.threads = 65; });
   refused("method", [](maq_predictor_config& config) {
-    const int32_t unknown = 3;
+    const int32_t unknown = 4;
     std::memcpy(&config.method, &unknown, sizeof unknown);
   });
   refused("frame_pool_size", [](maq_predictor_config& config) { config.frame_pool_size = 0; });

@@ -5,7 +5,8 @@ says of codes.
 frames 1 to 5 of data/tiny_prediction given those before them, at 10 frames a second. `stream.f32`: [5][256], bits of a
 code as surprise has them from these, mean of the place. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
 likeliest given those before it. `expected.f32`: [16][16][16], what the decoder is given of the frame that is expected
-0.4 s after frame 2, given frames 0 to 2, and as what motion foresees frame 3.
+0.4 s after frame 2, given frames 0 to 2, and as what motion foresees frame 3; `mended.f32`: [64][64][3], that as the
+network without codes has it.
 
     python -m tests.native.generate.make_tiny_transformer
 """
@@ -24,11 +25,12 @@ from export.checked_file import write_whole
 from export.prediction.code_file import prior_of, read_code_file
 from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
-from export.prediction.graph_runtime import GraphRuntime
+from export.prediction.graphs.graph_runtime import GraphRuntime
+from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
 from export.prediction.parallel import ParallelTransformer, times_ahead
+from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.transformer import UNSEEN, LatentTransformer
-from export.prediction.transformer_file import TransformerTables, transformer_bytes
 from tests.native.generate.make_tiny_prediction import tiny
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_transformer"
@@ -43,7 +45,7 @@ def frames_before(codes: np.ndarray, t: int) -> np.ndarray:
 
 
 def main() -> None:
-    autoencoder, _, codes = tiny()
+    autoencoder, frames, codes = tiny()
     table = CodeTable.counted(codes[None, :5], SHAPE.entries)
     torch.manual_seed(7)
     net = LatentTransformer(SHAPE).eval()
@@ -62,7 +64,14 @@ def main() -> None:
     entries = autoencoder.codebook.entries
     mean = torch.cat([likely @ own for likely, own in zip(chances, entries, strict=True)], -1)
     bundle = FOLDER / "bundle"
-    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, parallel)
+    mender = ConvolutionalNet(ConvolutionalShape(widths=(4, 8, 8), blocks=1, kernel=3, motion=True)).eval()
+    with torch.no_grad():
+        for parameter in mender.parameters():
+            parameter.add_(0.05 * torch.randn_like(parameter))
+        times = times_ahead(torch.tensor([FPS]), torch.tensor([4.0]))
+        mended = mender.predicted(torch.from_numpy(frames[None, :4]), times)
+    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, parallel, mender)
+    mended.numpy().astype("<f4").tofile(FOLDER / "mended.f32")
     mean.numpy().astype("<f4").tofile(FOLDER / "expected.f32")
     tables = TransformerTables.of(net)
     write_whole(transformer_bytes(tables, row_bytes=1), FOLDER / "rows_in_bytes.maqr")

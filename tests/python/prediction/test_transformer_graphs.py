@@ -9,10 +9,10 @@ import torch
 
 from export.prediction.config import TransformerShape
 from export.prediction.export_transformer import export_transformer
-from export.prediction.graph_runtime import GraphRuntime
+from export.prediction.graphs.graph_runtime import GraphRuntime
+from export.prediction.graphs.transformer_file import TransformerTables
 from export.prediction.sampling import drawn_codes
 from export.prediction.transformer import UNSEEN, LatentTransformer
-from export.prediction.transformer_file import TransformerTables
 
 SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=8, slices=3, entries=16)
 FPS = 15.0

@@ -27,7 +27,7 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
-       "head/render", "prediction", "prediction/codes", "prediction/latent", "prediction/surprise",
+       "head/render", "prediction", "prediction/codes", "prediction/networks", "prediction/surprise",
        "prediction/transformer", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
@@ -59,7 +59,7 @@ MAY_INCLUDE = {
     "head/wrap": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
     "prediction/codes": BASE,
-    "prediction/latent": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
+    "prediction/networks": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
     "prediction/surprise": BASE | {"prediction/codes", "prediction/transformer"},
     "prediction/transformer": BASE | {"prediction", "prediction/codes"},
     "scene": BASE - {"nn"},
@@ -121,6 +121,7 @@ FOREIGN = {
 DEFENDED = {
     "head/fit/adam": "an algorithm of the literature, with a test of its own",
     "head/fit/pose_rays": "geometry with a test of its own, against finite differences",
+    "prediction/transformer/philox": "an algorithm of the literature with a test of its own",
     "scene/render/refiner_roi": "geometry with tests of its own, against every pixel that the refiner reads",
 }
 

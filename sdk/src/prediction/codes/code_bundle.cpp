@@ -26,17 +26,23 @@ std::shared_ptr<const FrameCodes> codes_of(Bundle& bundle) {
   return codes;
 }
 
-// That a side of a graph is this one tensor.
-void require_tensor(const Manifest& manifest, const char* graph, const std::vector<TensorSpec>& side, const char* what,
-                    const char* name, const Shape& shape) {
-  const std::vector<Dimension> wanted(shape.begin(), shape.end());
-  if (side.size() == 1 && side[0].name == name && side[0].shape == wanted) return;
-  throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": graph ", graph, " must have one ", what, ", ", name,
-              " [", shape[0], ", ", shape[1], ", ", shape[2], ", ", shape[3],
-              "], as frame_px and the codes have it. Export the bundle again.");
-}
-
 }  // namespace
+
+void require_tensors(const Manifest& manifest, const char* graph, const char* what, const std::vector<TensorSpec>& side,
+                     const std::vector<NamedShape>& wanted) {
+  const auto is_same = [](const TensorSpec& found, const NamedShape& tensor) {
+    return found.name == tensor.name && found.shape == std::vector<Dimension>(tensor.shape.begin(), tensor.shape.end());
+  };
+  if (std::equal(side.begin(), side.end(), wanted.begin(), wanted.end(), is_same)) return;
+  std::string text;
+  for (const NamedShape& tensor : wanted) {
+    text += concatenate(text.empty() ? "" : ", ", tensor.name, " [");
+    for (const int64_t& size : tensor.shape) text += concatenate(&size == tensor.shape.begin() ? "" : ", ", size);
+    text += "]";
+  }
+  throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", manifest.name, ": graph ", graph, " must have the ", what, " ", text,
+              ", as frame_px and the codes have it. Export the bundle again.");
+}
 
 CodeBundle::CodeBundle(Bundle opened)
     : bundle(checked_prediction(std::move(opened))),
@@ -44,10 +50,10 @@ CodeBundle::CodeBundle(Bundle opened)
       frame_px(bundle.manifest.root.at("frame_px").integer(1, kMaxFrame_px)) {
   const Manifest& manifest = bundle.manifest;
   const GraphSpec &encoder = manifest.graphs.at("encoder"), &decoder = manifest.graphs.at("decoder");
-  require_tensor(manifest, "encoder", encoder.inputs, "input", "image", frame_shape());
-  require_tensor(manifest, "encoder", encoder.outputs, "output", "features", features_shape());
-  require_tensor(manifest, "decoder", decoder.inputs, "input", "features", features_shape());
-  require_tensor(manifest, "decoder", decoder.outputs, "output", "image", frame_shape());
+  require_tensors(manifest, "encoder", "inputs", encoder.inputs, {{"image", frame_shape()}});
+  require_tensors(manifest, "encoder", "outputs", encoder.outputs, {{"features", features_shape()}});
+  require_tensors(manifest, "decoder", "inputs", decoder.inputs, {{"features", features_shape()}});
+  require_tensors(manifest, "decoder", "outputs", decoder.outputs, {{"image", frame_shape()}});
 }
 
 }  // namespace maq

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "nn/bundle.h"
 #include "nn/session.h"
@@ -24,5 +25,13 @@ struct CodeBundle {
     return {1, int64_t(codes->side), int64_t(codes->side), int64_t(codes->slices * codes->width)};
   }
 };
+
+// Throws MAQ_ERROR_BAD_BUNDLE unless a side ("inputs") of a graph is these tensors, in their order.
+struct NamedShape {
+  const char* name;
+  Shape shape;
+};
+void require_tensors(const Manifest& manifest, const char* graph, const char* what, const std::vector<TensorSpec>& side,
+                     const std::vector<NamedShape>& wanted);
 
 }  // namespace maq

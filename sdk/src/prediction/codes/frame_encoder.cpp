@@ -30,13 +30,10 @@ FrameEncoder::FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, co
   session_ = std::make_unique<Session>(std::move(runtime), bytes, graph, name, settings);
 }
 
-EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found, uint8_t* squeezed) {
+void FrameEncoder::resize(const ImageView& image) {
   if (is_depth(image.format)) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no codes; give a picture.");
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  EncoderTimes times;
-  Stopwatch stage;
   NetworkInputSpec in_bytes;
   in_bytes.std = {1, 1, 1};
   make_network_input(image, {frame_px_, frame_px_}, in_bytes, resized_);
@@ -45,6 +42,19 @@ EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found, uint8_t*
   for (size_t i = 0; i < pixels; ++i) {
     for (size_t c = 0; c < 3; ++c) image_[3 * i + c] = std::floor(resized_.values[c * pixels + i] + 0.5f);
   }
+}
+
+void FrameEncoder::squeeze(const ImageView& image, uint8_t* squeezed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  resize(image);
+  std::transform(image_.begin(), image_.end(), squeezed, [](float value) { return uint8_t(value); });
+}
+
+EncoderTimes FrameEncoder::run(const ImageView& image, uint16_t* found, uint8_t* squeezed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  EncoderTimes times;
+  Stopwatch stage;
+  resize(image);
   if (squeezed != nullptr) {
     std::transform(image_.begin(), image_.end(), squeezed, [](float value) { return uint8_t(value); });
   }

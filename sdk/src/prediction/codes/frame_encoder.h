@@ -35,7 +35,13 @@ class FrameEncoder {
   // `found` is then as before.
   EncoderTimes run(const ImageView& image, uint16_t* found, uint8_t* squeezed = nullptr);
 
+  // That square alone. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
+  void squeeze(const ImageView& image, uint8_t* squeezed);
+
  private:
+  // Into image_. The mutex is held.
+  void resize(const ImageView& image);
+
   const std::shared_ptr<const FrameCodes> codes_;
   const NearestEntry nearest_;
   const int frame_px_;

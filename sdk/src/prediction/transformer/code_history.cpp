@@ -4,17 +4,19 @@
 
 namespace maq {
 
-void CodeHistory::add(const uint16_t* codes, int64_t time_ns) {
-  std::copy_n(codes, count_, codes_.data() + next_ * count_);
+template <class Value>
+void FrameHistory<Value>::add(const Value* values, int64_t time_ns) {
+  std::copy_n(values, count_, values_.data() + next_ * count_);
   times_ns_[next_] = time_ns;
   next_ = (next_ + 1) % kKept;
   size_ = std::min(size_ + 1, kKept);
 }
 
-void CodeHistory::select(int64_t coming_ns, size_t wanted, const uint16_t** frames) const {
+template <class Value>
+void FrameHistory<Value>::select(int64_t coming_ns, size_t wanted, const Value** frames) const {
   std::fill_n(frames, wanted, nullptr);
   if (size_ == 0 || wanted == 0) return;
-  frames[wanted - 1] = at(0).codes;
+  frames[wanted - 1] = at(0).values;
   // Times of one stream are within seconds of each other, and may be anywhere; so are doubles of their differences.
   const auto before_newest = [&](size_t age) { return double(uint64_t(newest_ns()) - uint64_t(at(age).time_ns)); };
   const double step = double(uint64_t(coming_ns) - uint64_t(newest_ns()));
@@ -25,8 +27,11 @@ void CodeHistory::select(int64_t coming_ns, size_t wanted, const uint16_t** fram
     if (++age >= size_) return;
     while (age + 1 < size_ && off(age + 1) < off(age)) ++age;
     if (off(age) > step / 2) return;
-    frames[wanted - 1 - k] = at(age).codes;
+    frames[wanted - 1 - k] = at(age).values;
   }
 }
+
+template class FrameHistory<uint16_t>;
+template class FrameHistory<uint8_t>;
 
 }  // namespace maq

@@ -23,9 +23,14 @@ void MotionCodes::add(const uint8_t* rgb, int64_t time_ns) {
   frames_ = std::min<size_t>(frames_ + 1, 2);
 }
 
-const uint16_t* MotionCodes::at(int64_t coming_ns, const uint16_t* newest) {
+const uint8_t* MotionCodes::picture(int64_t coming_ns) {
   if (frames_ < 2) return nullptr;
   predictor_.predict(coming_ns - newest_ns_, moved_);
+  return moved_.storage.data();
+}
+
+const uint16_t* MotionCodes::at(int64_t coming_ns, const uint16_t* newest) {
+  if (picture(coming_ns) == nullptr) return nullptr;
   if (predictor_.stats().method == MAQ_PREDICTION_LAST) return newest;
   encoder_->run(moved_.image, codes_.data());
   return codes_.data();

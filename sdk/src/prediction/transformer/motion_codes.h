@@ -1,4 +1,4 @@
-// Codes of the picture that motion alone foresees: what the transformer is shown beside the frames before.
+// The picture that motion alone foresees, and its codes: what networks are shown beside the frames before.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +24,8 @@ class MotionCodes {
   // after it: [places][slices], until the next call; null until two frames have shown how things move. `newest`: codes
   // of the newest frame, which it is where nothing moves. Throws what FrameEncoder::run() throws.
   const uint16_t* at(int64_t coming_ns, const uint16_t* newest);
+  // That picture: R, G, B of [frame_px][frame_px].
+  const uint8_t* picture(int64_t coming_ns);
 
  private:
   std::shared_ptr<FrameEncoder> encoder_;

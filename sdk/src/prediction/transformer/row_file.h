@@ -1,5 +1,5 @@
 // What is looked up around the graphs of the transformer, in a file of a bundle (.maqr, docs/formats.md). Written by
-// export/prediction/transformer_file.py.
+// export/prediction/graphs/transformer_file.py.
 #pragma once
 
 #include <cstddef>

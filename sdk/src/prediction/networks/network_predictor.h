@@ -9,8 +9,9 @@
 #include "core/worker_threads.h"
 #include "prediction/codes/frame_decoder.h"
 #include "prediction/codes/frame_encoder.h"
-#include "prediction/latent/expected_frame.h"
-#include "prediction/latent/picture_difference.h"
+#include "prediction/networks/expected_frame.h"
+#include "prediction/networks/mended_picture.h"
+#include "prediction/networks/picture_difference.h"
 #include "prediction/predictor.h"
 #include "prediction/transformer/code_history.h"
 #include "prediction/transformer/code_transformer.h"
@@ -18,24 +19,31 @@
 
 namespace maq {
 
-// Shared by streams. One of the last two may be null.
-struct LatentNetworks {
+// Shared by streams. The last three may be null where no predictor has that mode.
+struct PredictionNetworks {
   std::shared_ptr<FrameEncoder> encoder;
   std::shared_ptr<FrameDecoder> decoder;
-  std::shared_ptr<ExpectedFrame> expected;       // one pass gives the mean of what may come
-  std::shared_ptr<CodeTransformer> transformer;  // draws one of what may come, frame after frame
+  std::shared_ptr<MendedPicture> mended;
+  std::shared_ptr<ExpectedFrame> expected;
+  std::shared_ptr<CodeTransformer> transformer;
 };
 
-struct LatentSettings {
-  bool draws = false;  // by the transformer, which is then not null; else the expected frame
+enum class NetworkMode {
+  kMended,    // what motion foresees, mended
+  kExpected,  // the mean of the codes that may come
+  kDrawn      // codes of one of what may come, frame after frame
+};
+
+struct NetworkSettings {
+  NetworkMode mode = NetworkMode::kMended;
   SamplingSettings sampling;
 };
 
 // Not for two threads at once.
-class LatentPredictor {
+class NetworkPredictor {
  public:
   // `threads`: for pixels.
-  LatentPredictor(LatentNetworks networks, const LatentSettings& settings, int threads);
+  NetworkPredictor(PredictionNetworks networks, const NetworkSettings& settings, int threads);
 
   // As Predictor::push(). Throws what that and FrameEncoder::run() throw.
   void push(const Frame& frame);
@@ -51,20 +59,23 @@ class LatentPredictor {
   size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction
 
  private:
-  // Features of the decoder, of the time `ahead_ns` after the newest frame.
+  // Of the time `ahead_ns` after the newest frame: a picture into made_; features of the decoder; codes into drawn_.
+  void mend(int64_t ahead_ns);
   void foresee(int64_t ahead_ns);
   void draw(int64_t ahead_ns);
 
-  const LatentNetworks networks_;
-  const LatentSettings settings_;
+  const PredictionNetworks networks_;
+  const NetworkSettings settings_;
   Predictor base_;
   WorkerThreads threads_;
-  CodeHistory history_, drawn_history_;
+  CodeHistory history_, drawn_history_;  // of modes with codes
+  PictureHistory pictures_;              // of the other
   MotionCodes motion_;
   PictureDifference difference_;
   std::vector<uint16_t> codes_, base_codes_, drawn_;
   std::vector<uint8_t> squeezed_;
   std::vector<float> features_, made_, of_base_;
+  bool has_frame_ = false;
   int64_t newest_ns_ = 0, step_ns_ = 0;  // the latter from the frame before
   uint64_t resets_ = 0;                  // of base_
   uint32_t frame_ = 0;                   // counts predictions, for random numbers

@@ -12,9 +12,9 @@ import numpy as np
 from export.densepose.graphs import session
 from export.prediction.attention import PLACES
 from export.prediction.config import CODE_SIDE
+from export.prediction.graphs.transformer_file import TransformerTables
+from export.prediction.graphs.transformer_graphs import CONTEXT, NEIGHBOURS, SLICES, head_name, slice_names
 from export.prediction.transformer import UNSEEN
-from export.prediction.transformer_file import TransformerTables
-from export.prediction.transformer_graphs import CONTEXT, NEIGHBOURS, SLICES, head_name, slice_names
 
 # Logits [K] of slice k at a place -> the code.
 Choice = Callable[[int, int, np.ndarray], int]

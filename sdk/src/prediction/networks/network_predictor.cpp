@@ -1,6 +1,7 @@
-#include "prediction/latent/latent_predictor.h"
+#include "prediction/networks/network_predictor.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "core/clock.h"
@@ -12,13 +13,14 @@ constexpr int64_t kLongestStep_ns = 100000000;  // of drawn frames: the transfor
 
 }  // namespace
 
-LatentPredictor::LatentPredictor(LatentNetworks networks, const LatentSettings& settings, int threads)
+NetworkPredictor::NetworkPredictor(PredictionNetworks networks, const NetworkSettings& settings, int threads)
     : networks_(std::move(networks)),
       settings_(settings),
       base_({MAQ_PREDICTION_AUTO, threads}),
       threads_(threads),
       history_(networks_.encoder->codes().count()),
       drawn_history_(history_),
+      pictures_(size_t(networks_.encoder->frame_px()) * size_t(networks_.encoder->frame_px()) * 3),
       motion_(networks_.encoder),
       codes_(networks_.encoder->codes().count()),
       base_codes_(codes_.size()),
@@ -30,30 +32,53 @@ LatentPredictor::LatentPredictor(LatentNetworks networks, const LatentSettings& 
   features_.resize(codes_.size() * networks_.encoder->codes().width);
 }
 
-void LatentPredictor::reset() {
+void NetworkPredictor::reset() {
   base_.reset();
   history_.clear();
+  pictures_.clear();
   motion_.reset();
+  has_frame_ = false;
+  step_ns_ = 0;
 }
 
-void LatentPredictor::push(const Frame& frame) {
+void NetworkPredictor::push(const Frame& frame) {
+  const bool has_codes = settings_.mode != NetworkMode::kMended;
   Stopwatch stage;
-  networks_.encoder->run(frame.image, codes_.data(), squeezed_.data());
+  if (has_codes) {
+    networks_.encoder->run(frame.image, codes_.data(), squeezed_.data());
+  } else {
+    networks_.encoder->squeeze(frame.image, squeezed_.data());
+  }
   networks_ms_ = float(stage.lap_ms());
   base_.push(frame);
   if (base_.stats().resets != resets_) {
     resets_ = base_.stats().resets;
     history_.clear();
+    pictures_.clear();
     motion_.reset();
+    has_frame_ = false;
   }
-  if (history_.size() > 0 && frame.timestamp_ns == newest_ns_) return;  // again; the codes of the first stay
-  step_ns_ = history_.size() > 0 ? frame.timestamp_ns - newest_ns_ : 0;
+  if (has_frame_ && frame.timestamp_ns == newest_ns_) return;  // again; what is known of the first stays
+  step_ns_ = has_frame_ ? frame.timestamp_ns - newest_ns_ : 0;
   newest_ns_ = frame.timestamp_ns;
-  history_.add(codes_.data(), newest_ns_);
+  has_frame_ = true;
+  if (has_codes) {
+    history_.add(codes_.data(), newest_ns_);
+  } else {
+    pictures_.add(squeezed_.data(), newest_ns_);
+  }
   motion_.add(squeezed_.data(), newest_ns_);
 }
 
-void LatentPredictor::draw(int64_t ahead_ns) {
+void NetworkPredictor::mend(int64_t ahead_ns) {
+  std::array<const uint8_t*, MendedPicture::kMaxBefore> frames{};
+  MendedPicture& mended = *networks_.mended;
+  pictures_.select(newest_ns_ + step_ns_, mended.before(), frames.data());
+  mended.run(frames.data(), motion_.picture(newest_ns_ + ahead_ns), float(double(step_ns_) / 1e9),
+             float(double(ahead_ns) / 1e9), made_.data());
+}
+
+void NetworkPredictor::draw(int64_t ahead_ns) {
   const auto count = std::max<int64_t>(1, (ahead_ns + kLongestStep_ns - 1) / kLongestStep_ns);
   drawn_history_ = history_;
   std::copy(codes_.begin(), codes_.end(), drawn_.begin());
@@ -73,7 +98,7 @@ void LatentPredictor::draw(int64_t ahead_ns) {
   steps_ = size_t(count);
 }
 
-void LatentPredictor::foresee(int64_t ahead_ns) {
+void NetworkPredictor::foresee(int64_t ahead_ns) {
   ContextFrames frames{};
   ExpectedFrame& expected = *networks_.expected;
   history_.select(newest_ns_ + step_ns_, expected.before(), frames.data());
@@ -81,21 +106,30 @@ void LatentPredictor::foresee(int64_t ahead_ns) {
   expected.run(frames, float(double(step_ns_) / 1e9), float(double(ahead_ns) / 1e9), features_.data());
 }
 
-void LatentPredictor::predict(int64_t ahead_ns, Frame& frame) {
+void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
   base_.predict(ahead_ns, frame);
   networks_ms_ = 0;
   steps_ = 0;
   if (ahead_ns == 0 || step_ns_ == 0 || !base_.moves()) return;
   Stopwatch stage;
-  if (settings_.draws) {
-    draw(ahead_ns);
-    networks_.decoder->picture(drawn_.data(), made_.data());
-  } else {
-    foresee(ahead_ns);
-    networks_.decoder->picture(features_.data(), made_.data());
+  switch (settings_.mode) {
+    case NetworkMode::kMended: mend(ahead_ns); break;
+    case NetworkMode::kExpected:
+      foresee(ahead_ns);
+      networks_.decoder->picture(features_.data(), made_.data());
+      break;
+    case NetworkMode::kDrawn:
+      draw(ahead_ns);
+      networks_.decoder->picture(drawn_.data(), made_.data());
+      break;
   }
-  networks_.encoder->run(frame.image, base_codes_.data());
-  networks_.decoder->picture(base_codes_.data(), of_base_.data());
+  if (settings_.mode == NetworkMode::kMended) {
+    networks_.encoder->squeeze(frame.image, squeezed_.data());
+    std::copy(squeezed_.begin(), squeezed_.end(), of_base_.begin());
+  } else {
+    networks_.encoder->run(frame.image, base_codes_.data());
+    networks_.decoder->picture(base_codes_.data(), of_base_.data());
+  }
   for (size_t i = 0; i < made_.size(); ++i) made_[i] -= of_base_[i];
   difference_.add(made_.data(), networks_.encoder->frame_px(), frame.image, threads_, frame.storage.data());
   networks_ms_ = float(stage.lap_ms());

@@ -8,6 +8,7 @@
 
 #include "nn/session.h"
 #include "prediction/codes/code_bundle.h"
+#include "prediction/networks/forecast_times.h"
 #include "prediction/transformer/row_sums.h"
 
 namespace maq {
@@ -33,7 +34,7 @@ class ExpectedFrame {
  private:
   const std::shared_ptr<const FrameCodes> codes_;
   size_t before_ = 0, frames_ = 0;
-  float min_fps_ = 0, max_fps_ = 0, max_ahead_ = 0;  // the last in steps
+  ForecastTimes trained_;
   std::unique_ptr<Session> session_;
 
   std::mutex mutex_;          // of what follows, and of the session

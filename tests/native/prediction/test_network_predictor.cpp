@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/convert.h"
-#include "prediction/latent/latent_predictor.h"
+#include "prediction/networks/network_predictor.h"
 #include "support/expect_error.h"
 #include "support/moving_texture.h"
 #include "support/tiny_transformer.h"
@@ -17,19 +17,28 @@ std::shared_ptr<maq::ExpectedFrame> expected_frame(const std::string& bundle = t
                                               maq::SessionSettings{});
 }
 
-maq::LatentNetworks networks() {
+std::shared_ptr<maq::MendedPicture> mended_picture(const std::string& bundle = tiny_transformer::kBundle) {
+  return std::make_shared<maq::MendedPicture>(tiny_prediction::runtime(), maq::CodeBundle(maq::read_bundle(bundle)),
+                                              maq::SessionSettings{});
+}
+
+maq::PredictionNetworks networks() {
   const maq::CodeBundle bundle(maq::read_bundle(tiny_transformer::kBundle));
-  maq::LatentNetworks all;
+  maq::PredictionNetworks all;
   all.encoder = tiny_prediction::encoder(tiny_transformer::kBundle);
   all.decoder = std::make_shared<maq::FrameDecoder>(tiny_prediction::runtime(), bundle, maq::SessionSettings{});
+  all.mended = mended_picture();
   all.expected = expected_frame();
   all.transformer = tiny_transformer::open();
   return all;
 }
 
-maq::LatentPredictor predictor(bool draws) {
-  maq::LatentSettings settings;
-  settings.draws = draws;
+constexpr maq::NetworkMode kModes[] = {maq::NetworkMode::kMended, maq::NetworkMode::kExpected,
+                                       maq::NetworkMode::kDrawn};
+
+maq::NetworkPredictor predictor(maq::NetworkMode mode) {
+  maq::NetworkSettings settings;
+  settings.mode = mode;
   return {networks(), settings, 1};
 }
 
@@ -43,7 +52,7 @@ std::vector<uint8_t> packed_pixels(const maq::Frame& frame) {
   return pixels;
 }
 
-TEST(LatentPredictor, TheExpectedFrameIsThatOfTorch) {
+TEST(NetworkPredictor, TheExpectedFrameIsThatOfTorch) {
   const auto expected = expected_frame();
   ASSERT_TRUE(expected->has_motion());
   maq::ContextFrames frames = tiny_transformer::before(3).frames;
@@ -62,25 +71,48 @@ TEST(LatentPredictor, TheExpectedFrameIsThatOfTorch) {
   EXPECT_NE(found, before) << "another time";
 }
 
-TEST(LatentPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromTheirsOfIt) {
-  for (const bool draws : {false, true}) {
-    maq::LatentPredictor latent = predictor(draws);
+TEST(NetworkPredictor, TheMendedPictureIsThatOfTorch) {
+  const auto mended = mended_picture();
+  ASSERT_EQ(mended->before(), 3u);
+  const std::vector<float> of_torch = tiny_transformer::floats_of("mended.f32");
+  const std::string all = read_text(tiny_prediction::kFolder + "/frames.rgb");
+  const auto* const first = reinterpret_cast<const uint8_t*>(all.data());
+  constexpr size_t kPicture = 64 * 64 * 3;
+  const uint8_t* frames[] = {first, first + kPicture, first + 2 * kPicture};
+  std::vector<float> found(kPicture), other(kPicture);
+  for (int again = 0; again < 2; ++again) {
+    mended->run(frames, first + 3 * kPicture, 0.1f, 0.4f, found.data());
+    for (size_t i = 0; i < found.size(); ++i) ASSERT_NEAR(found[i], of_torch[i], 0.02) << i;
+  }
+  mended->run(frames, first + 3 * kPicture, 0.1f, 0.8f, other.data());
+  EXPECT_NE(found, other) << "another time";
+  frames[0] = nullptr;
+  mended->run(frames, first + 3 * kPicture, 0.1f, 0.4f, found.data());
+  frames[0] = frames[1];
+  mended->run(frames, first + 3 * kPicture, 0.1f, 0.4f, other.data());
+  EXPECT_EQ(found, other) << "the first is repeated";
+}
+
+TEST(NetworkPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromTheirsOfIt) {
+  for (const maq::NetworkMode mode : kModes) {
+    maq::NetworkPredictor by_network = predictor(mode);
     maq::Predictor base({MAQ_PREDICTION_AUTO, 1});
-    const maq::LatentNetworks own = networks();
+    const maq::PredictionNetworks own = networks();
     maq::MotionCodes motion(own.encoder);
     std::vector<uint16_t> codes[4];
+    std::vector<uint8_t> seen[4];
     for (int number = 0; number < 4; ++number) {
       const maq::Frame frame = tiny_prediction::frame(number);
-      latent.push(frame);
+      by_network.push(frame);
       base.push(frame);
       codes[number].resize(own.encoder->codes().count());
-      std::vector<uint8_t> squeezed(64 * 64 * 3);
-      own.encoder->run(frame.image, codes[number].data(), squeezed.data());
-      motion.add(squeezed.data(), frame.timestamp_ns);
+      seen[number].resize(64 * 64 * 3);
+      own.encoder->run(frame.image, codes[number].data(), seen[number].data());
+      motion.add(seen[number].data(), frame.timestamp_ns);
     }
     ASSERT_TRUE(base.moves());
     maq::Frame of_latent, of_base;
-    latent.predict(tiny_prediction::kFrame_ns, of_latent);
+    by_network.predict(tiny_prediction::kFrame_ns, of_latent);
     base.predict(tiny_prediction::kFrame_ns, of_base);
     std::vector<float> made(64 * 64 * 3), of_theirs(made.size()), features(256 * 16);
     maq::CodesBefore before;
@@ -88,7 +120,10 @@ TEST(LatentPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromThe
     before.newest = codes[3].data();
     before.step_s = 0.1f;
     std::vector<uint16_t> found(codes[3].size());
-    if (draws) {
+    if (mode == maq::NetworkMode::kMended) {
+      const uint8_t* const shown[] = {seen[1].data(), seen[2].data(), seen[3].data()};
+      own.mended->run(shown, motion.picture(4 * tiny_prediction::kFrame_ns), 0.1f, 0.1f, made.data());
+    } else if (mode == maq::NetworkMode::kDrawn) {
       own.transformer->draw(before, {}, 1, 0, 1, found.data());
       own.decoder->picture(found.data(), made.data());
     } else {
@@ -98,6 +133,11 @@ TEST(LatentPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromThe
     }
     own.encoder->run(of_base.image, found.data());
     own.decoder->picture(found.data(), of_theirs.data());
+    if (mode == maq::NetworkMode::kMended) {
+      std::vector<uint8_t> squeezed(made.size());
+      own.encoder->squeeze(of_base.image, squeezed.data());
+      std::copy(squeezed.begin(), squeezed.end(), of_theirs.begin());
+    }
     const std::vector<uint8_t> from = packed_pixels(of_base), to = packed_pixels(of_latent);
     int changed = 0;
     for (size_t i = 0; i < to.size(); ++i) {
@@ -106,29 +146,29 @@ TEST(LatentPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromThe
       changed += from[i] != to[i] ? 1 : 0;
     }
     EXPECT_GT(changed, 1000);
-    EXPECT_EQ(latent.steps(), draws ? 1u : 0u);
-    EXPECT_GT(latent.networks_ms(), 0);
+    EXPECT_EQ(by_network.steps(), mode == maq::NetworkMode::kDrawn ? 1u : 0u);
+    EXPECT_GT(by_network.networks_ms(), 0);
     EXPECT_TRUE(of_latent.origin.is_predicted);
   }
 }
 
-TEST(LatentPredictor, WhereNothingMovesItIsTheLastFrame) {
-  for (const bool draws : {false, true}) {
-    maq::LatentPredictor latent = predictor(draws);
+TEST(NetworkPredictor, WhereNothingMovesItIsTheLastFrame) {
+  for (const maq::NetworkMode mode : kModes) {
+    maq::NetworkPredictor by_network = predictor(mode);
     maq::Frame shown = moving(0), predicted;
     for (int number = 0; number < 4; ++number) {
       shown.timestamp_ns = number * tiny_prediction::kFrame_ns;
-      latent.push(shown);
+      by_network.push(shown);
       for (const int64_t ahead_ns : {int64_t(0), tiny_prediction::kFrame_ns, 100 * tiny_prediction::kFrame_ns}) {
-        latent.predict(ahead_ns, predicted);
+        by_network.predict(ahead_ns, predicted);
         EXPECT_EQ(packed_pixels(predicted), packed_pixels(shown));
-        EXPECT_EQ(latent.networks_ms(), 0);
+        EXPECT_EQ(by_network.networks_ms(), 0);
       }
     }
   }
 }
 
-TEST(LatentPredictor, EveryFormatIsChangedAlike) {
+TEST(NetworkPredictor, EveryFormatIsChangedAlike) {
   maq::PictureDifference difference;
   maq::WorkerThreads threads(2);
   std::vector<float> change(8 * 8 * 3);
@@ -163,7 +203,7 @@ TEST(LatentPredictor, EveryFormatIsChangedAlike) {
   }
 }
 
-TEST(LatentPredictor, LessThanHalfALevelChangesNothingAndBytesDoNotOverflow) {
+TEST(NetworkPredictor, LessThanHalfALevelChangesNothingAndBytesDoNotOverflow) {
   maq::PictureDifference difference;
   maq::WorkerThreads threads(1);
   maq::Frame frame = moving(3), before = moving(3);
@@ -176,59 +216,68 @@ TEST(LatentPredictor, LessThanHalfALevelChangesNothingAndBytesDoNotOverflow) {
   EXPECT_EQ(packed_pixels(frame), std::vector<uint8_t>(160 * 120 * 3, 0));
 }
 
-TEST(LatentPredictor, NothingOfTheSceneBeforeACutOrAResetIsUsed) {
+TEST(NetworkPredictor, NothingOfTheSceneBeforeACutOrAResetIsUsed) {
   for (const bool by_reset : {false, true}) {
-    maq::LatentPredictor latent = predictor(false), fresh = predictor(false);
-    for (int number = 0; number < 5; ++number) latent.push(moving(number));
+    maq::NetworkPredictor by_network = predictor(maq::NetworkMode::kMended),
+                          fresh = predictor(maq::NetworkMode::kMended);
+    for (int number = 0; number < 5; ++number) by_network.push(moving(number));
     maq::Frame white = moving(5);
     std::fill(white.storage.begin(), white.storage.end(), uint8_t(255));
-    if (by_reset) latent.reset();
-    latent.push(white);
+    if (by_reset) by_network.reset();
+    by_network.push(white);
     fresh.push(white);
     for (int number = 6; number < 9; ++number) {
       const maq::Frame other =
           moving_texture::frame(MAQ_PIXEL_BGR8, 160, 120, 900 - 2 * number, 700, number * tiny_prediction::kFrame_ns);
-      latent.push(other);
+      by_network.push(other);
       fresh.push(other);
       maq::Frame one, two;
-      latent.predict(tiny_prediction::kFrame_ns, one);
+      by_network.predict(tiny_prediction::kFrame_ns, one);
       fresh.predict(tiny_prediction::kFrame_ns, two);
       EXPECT_EQ(packed_pixels(one), packed_pixels(two)) << by_reset << " " << number;
     }
   }
 }
 
-TEST(LatentPredictor, FramesFarAheadAreDrawnInSteps) {
-  maq::LatentPredictor latent = predictor(true);
-  for (int number = 0; number < 4; ++number) latent.push(moving(number, MAQ_PIXEL_NV12));
+TEST(NetworkPredictor, FramesFarAheadAreDrawnInSteps) {
+  maq::NetworkPredictor by_network = predictor(maq::NetworkMode::kDrawn);
+  for (int number = 0; number < 4; ++number) by_network.push(moving(number, MAQ_PIXEL_NV12));
   maq::Frame frame;
   for (const auto& [ahead_ns, steps] :
        {std::pair<int64_t, size_t>{33333333, 1}, {100000000, 1}, {100000001, 2}, {250000000, 3}}) {
-    latent.predict(ahead_ns, frame);
-    EXPECT_EQ(latent.steps(), steps);
+    by_network.predict(ahead_ns, frame);
+    EXPECT_EQ(by_network.steps(), steps);
   }
 }
 
-TEST(LatentPredictor, BundlesWhoseExpectedFrameIsNotWhatItShouldBeAreRefused) {
+TEST(NetworkPredictor, BundlesWhoseNetworksAreNotWhatTheyShouldBeAreRefused) {
   TempFolder folder;
   std::filesystem::copy(tiny_transformer::kBundle, folder.path(), std::filesystem::copy_options::recursive);
   const auto manifest = nlohmann::json::parse(read_text(tiny_transformer::kBundle + "/manifest.json"));
-  const auto refused = [&](const char* text, auto&& change) {
-    nlohmann::json changed = manifest;
-    change(changed);
-    write_text(folder.file("manifest.json"), changed.dump());
-    expect_error(MAQ_ERROR_BAD_BUNDLE, text, [&] { expected_frame(folder.path().string()); });
-  };
-  for (const char* key : {"before", "frames", "max_ahead", "fps"}) {
-    refused(key, [&](nlohmann::json& changed) { changed["expected"].erase(key); });
-    refused(key, [&](nlohmann::json& changed) { changed["expected"][key] = 0; });
-  }
-  refused("fps", [](nlohmann::json& changed) { changed["expected"]["fps"] = {30, 10}; });
-  refused("graph expected", [](nlohmann::json& changed) { changed["expected"]["frames"] = 3; });
-  refused("expected", [](nlohmann::json& changed) { changed["graphs"].erase("expected"); });
-  for (const char* side : {"inputs", "outputs"}) {
-    refused("graph expected", [&](nlohmann::json& changed) { changed["graphs"]["expected"][side][0]["name"] = "x"; });
-    refused("graph expected", [&](nlohmann::json& changed) { changed["graphs"]["expected"][side][0]["shape"][1] = 9; });
+  for (const std::string part : {"expected", "mended"}) {
+    const auto refused = [&](const std::string& text, auto&& change) {
+      nlohmann::json changed = manifest;
+      change(changed);
+      write_text(folder.file("manifest.json"), changed.dump());
+      expect_error(MAQ_ERROR_BAD_BUNDLE, text.c_str(), [&] {
+        part == "expected" ? void(expected_frame(folder.path().string()))
+                           : void(mended_picture(folder.path().string()));
+      });
+    };
+    for (const char* key : {"before", "max_ahead", "fps"}) {
+      refused(key, [&](nlohmann::json& changed) { changed[part].erase(key); });
+      refused(key, [&](nlohmann::json& changed) { changed[part][key] = 0; });
+    }
+    refused("fps", [&](nlohmann::json& changed) { changed[part]["fps"] = {30, 10}; });
+    refused("graph " + part, [&](nlohmann::json& changed) {
+      changed[part]["before"] = 4;
+      changed[part]["frames"] = 5;
+    });
+    refused(part, [&](nlohmann::json& changed) { changed["graphs"].erase(part); });
+    for (const char* side : {"inputs", "outputs"}) {
+      refused("graph " + part, [&](nlohmann::json& changed) { changed["graphs"][part][side][0]["name"] = "x"; });
+      refused("graph " + part, [&](nlohmann::json& changed) { changed["graphs"][part][side][0]["shape"][1] = 9; });
+    }
   }
 }
 

@@ -1,4 +1,4 @@
-#include "prediction/latent/picture_difference.h"
+#include "prediction/networks/picture_difference.h"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,1 @@
+"""Prediction of the next frames of a stream: Latent Video Transformer in torch."""

@@ -8,10 +8,10 @@
 
 #include "core/frame.h"
 #include "prediction/codes/frame_encoder.h"
-#include "prediction/transformer/code_history.h"
 #include "prediction/surprise/code_surprise.h"
-#include "prediction/transformer/motion_codes.h"
+#include "prediction/transformer/code_history.h"
 #include "prediction/transformer/code_transformer.h"
+#include "prediction/transformer/motion_codes.h"
 
 namespace maq {
 

@@ -32,7 +32,7 @@ def film(frames: np.ndarray, quality: int) -> bytes:
     with tempfile.NamedTemporaryFile(suffix=".mp4") as file:
         command = (
             f"ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s {SIDE_PX}x{SIDE_PX} -r 30 -i - -c:v libx264 "
-            f"-preset veryslow -crf {quality} -pix_fmt yuv444p -g {FRAMES} -keyint_min {FRAMES} -sc_threshold 0"
+            f"-preset medium -crf {quality} -pix_fmt yuv444p -g {FRAMES} -keyint_min {FRAMES} -sc_threshold 0"
         )
         try:
             subprocess.run([*command.split(), file.name], input=frames.tobytes(), check=True)

@@ -23,9 +23,9 @@ from export.prediction.data import Clips, read_clips
 from export.prediction.evaluate_events import Score, difference, flow_residual, measured
 
 
-def sdk_surprise(bundle: Path) -> Score:
+def sdk_surprise(bundle: Path, method: str = "auto") -> Score:
     """Bits of a code of each frame but the first, as maq_surprise_push gives them."""
-    stream = maquette.Surprise(bundle_path=bundle, threads=1)
+    stream = maquette.Surprise(bundle_path=bundle, method=method, threads=1)
 
     def score(frames: np.ndarray, fps: float) -> np.ndarray:
         stream.reset()
@@ -77,7 +77,9 @@ def main() -> None:
         clips = Clips(clips.frames[: options.clips], clips.fps[: options.clips], clips.names[: options.clips])
     cuts = cuts_found(clips, options.bundle, options.seed)
     print("called a cut: " + ", ".join(f"{kind or 'without event'} {n}/{of}" for kind, (n, of) in cuts.items()))
-    scores = {"difference": difference, "flow residual": flow_residual, "surprise": sdk_surprise(options.bundle)}
+    scores = {"difference": difference, "flow residual": flow_residual}
+    scores["surprise"] = sdk_surprise(options.bundle)
+    scores["surprise, table"] = sdk_surprise(options.bundle, "table")
     areas = measured(clips, scores, options.seed)
     print(" | ".join(["", *KINDS, "mean"]))
     for name, own in areas.items():

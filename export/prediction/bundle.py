@@ -20,7 +20,16 @@ FRAMES = 3  # before the one that is expected, which the parallel transformer se
 TRAINED_FPS = (10, 30)  # of the clips that transformers were trained on
 CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
-    {"name": "Maquette clips: shapes, pushing (export.clips)", "licence": LICENCE, "used_for": "training, calibration"},
+    {
+        "name": "Maquette clips: shapes, pushing, collages (export.clips)",
+        "licence": LICENCE,
+        "used_for": "training, calibration",
+    },
+    {
+        "name": "background photographs of export/photos/packages.toml",
+        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
+        "used_for": "training of the autoencoder, collages",
+    },
     {"name": "Franka Panda arm and objects of pybullet_data", "licence": "Apache-2.0, zlib", "used_for": "rendering"},
     {"name": "KUKA iiwa arm of pybullet_data", "licence": "BSD-2-Clause", "used_for": "rendering"},
 )

@@ -249,7 +249,7 @@ def _any_rotation(*shape: int, device: torch.device) -> Tensor:
     return torch.stack(rows, -1).unflatten(-1, (3, 3))
 
 
-def _shaped(half: Tensor, across_share: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def _shaped(half: Tensor, across_fraction: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Half sides [..., 3] -> those of planes, planes across, where these are, and bulges, of a random shape each: box,
     box with one or two corners off, cylinder, ball."""
     shape, device = half.shape[:-1], half.device
@@ -269,7 +269,7 @@ def _shaped(half: Tensor, across_share: float) -> tuple[Tensor, Tensor, Tensor, 
     n = torch.where((n.abs().sum(-1, keepdim=True) > 0) & ((n != 0).sum(-1, keepdim=True) > 1), n, n + 0.7)
     n = F.normalize(n / half[..., None, :] * half.amin(-1)[..., None, None], dim=-1)
     corner = (n.abs() * half[..., None, :]).sum(-1)
-    used = (torch.rand(*shape, 2, device=device) < across_share) & ~(cylinder | ball)[..., None]
+    used = (torch.rand(*shape, 2, device=device) < across_fraction) & ~(cylinder | ball)[..., None]
     at = torch.where(used, corner * _between(0.3, 0.9, *shape, 2, device=device), _FAR)
     return own, n, at, bulge
 

@@ -15,9 +15,16 @@ namespace {
 
 constexpr int64_t kStep_ns = 33333333;
 
-// The shipped network; one for all tests.
+constexpr const char* kShipped = MAQ_TEST_MODELS "/prediction-int8";
+
+// The shipped networks; one of each for all tests.
 std::shared_ptr<maq::FrameEncoder> shipped() {
-  static const auto opened = tiny_prediction::encoder(MAQ_TEST_MODELS "/prediction-int8");
+  static const auto opened = tiny_prediction::encoder(kShipped);
+  return opened;
+}
+
+std::shared_ptr<maq::CodeTransformer> shipped_transformer() {
+  static const auto opened = tiny_transformer::open(kShipped);
   return opened;
 }
 
@@ -100,8 +107,9 @@ TEST(Surprise, WithATransformerNothingOfTheSceneBeforeACutIsKnownAfterIt) {
 }
 
 TEST(Surprise, AStreamThatStandsStillHasLessThanATenthOfABitFromTheFifthFrameOn) {
-  const auto expect_still = [](const maq::Frame& still, int frames, std::shared_ptr<maq::FrameEncoder> encoder) {
-    maq::Surprise surprise(std::move(encoder));
+  const auto expect_still = [](const maq::Frame& still, int frames, std::shared_ptr<maq::FrameEncoder> encoder,
+                               std::shared_ptr<maq::CodeTransformer> transformer = nullptr) {
+    maq::Surprise surprise(std::move(encoder), std::move(transformer));
     for (int i = 0; i < frames; ++i) {
       maq::Frame frame;
       frame.image = still.image;
@@ -117,11 +125,13 @@ TEST(Surprise, AStreamThatStandsStillHasLessThanATenthOfABitFromTheFifthFrameOn)
   expect_still(texture_frame(0, 0), 20, shipped());
   for (const maq::Frame& still : {filled_frame(0, 0), filled_frame(255, 0), noise_frame(1, 0)}) {
     expect_still(still, 20, shipped());
+    expect_still(still, 20, shipped(), shipped_transformer());
   }
+  expect_still(texture_frame(0, 0), 20, shipped(), shipped_transformer());
 }
 
 TEST(Surprise, CutBlackOutAndFreezeStandOut) {
-  maq::Surprise surprise(shipped());
+  maq::Surprise surprise(shipped(), shipped_transformer());
   for (const auto& of_other_scene : {filled_frame(0, 20 * kStep_ns), noise_frame(3, 20 * kStep_ns)}) {
     surprise.reset();
     show_motion(surprise);
@@ -161,7 +171,7 @@ TEST(Surprise, NothingOfTheSceneBeforeACutIsKnownAfterIt) {
 
 TEST(Surprise, AnotherSizeOrFormatStandsOutAndStartsAnew) {
   for (int kind = 0; kind < 2; ++kind) {
-    maq::Surprise surprise(shipped()), fresh(shipped());
+    maq::Surprise surprise(shipped(), shipped_transformer()), fresh(shipped(), shipped_transformer());
     const int64_t time_ns = show_motion(surprise);
     const auto changed = [&](int i) {
       return kind == 0 ? texture_frame(40 + 2 * i, time_ns + i * kStep_ns, 640, 480)

@@ -30,6 +30,10 @@ typedef struct maq_edges_config {
   int32_t skip_planes;    /* 1: the network runs only on the part of a frame, half or all of each side, that has areas
                              which a plane does not explain within the sensor's noise; elsewhere the distance is eps_r.
                              Faster, and may miss flat creases in noise. 0 (default): on the whole frame */
+  int32_t average_frames; /* 2 to 64: depth is the mean of inverse depth over so many frames, one after the other, of a
+                             camera at rest, which takes noise away. Areas of 32 x 32 px in which something moves, and
+                             pixels that jump, begin anew; unknown depth stays unknown. 0 (default), 1: each frame is
+                             on its own */
 } maq_edges_config;
 
 /* The planes of a result: a value a pixel of the depth frame. */
@@ -39,7 +43,8 @@ typedef enum maq_edges_plane {
   MAQ_EDGES_PLANE_SPREAD = 2,   /* float: r by which that may be wrong, its mean absolute error as the network expects
                                    it; eps_r where depth is unknown */
   MAQ_EDGES_PLANE_KIND = 3,     /* uint8_t: a maq_edge_kind of that curve */
-  MAQ_EDGES_PLANE_DEPTH = 4     /* float: the frame's depth in metres, 0 where it is unknown */
+  MAQ_EDGES_PLANE_DEPTH = 4     /* float: the frame's depth in metres, or its mean with frames before it
+                                   (average_frames); 0 where it is unknown */
 } maq_edges_plane;
 
 typedef enum maq_edge_kind {
@@ -59,7 +64,7 @@ typedef struct maq_edges_field {
 /* Times of the stages of a run, in wall-clock milliseconds, and counts. */
 typedef struct maq_edges_stats {
   uint32_t struct_size;
-  float depth_ms;  /* depth to metres */
+  float depth_ms;  /* depth to metres, and average_frames */
   float skip_ms;   /* where the network must run (skip_planes) */
   float slopes_ms; /* the network's input: slopes of inverse depth */
   float network_ms;
@@ -72,6 +77,7 @@ typedef struct maq_edges_stats {
   maq_provider provider;       /* in use for the network */
   int32_t threads;             /* of the network; fewer where the system starts no more, as the log says then */
   int32_t is_threads_measured; /* 1: that number was chosen by MAQ_THREADS_MEASURED */
+  int64_t averaged_pixel_count; /* whose depth is the mean of several frames (average_frames) */
 } maq_edges_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_edges_config) of the caller.

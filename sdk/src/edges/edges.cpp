@@ -53,7 +53,8 @@ Edges::Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, c
       measures_threads_(settings.threads == MAQ_THREADS_MEASURED),
       network_(runtime, std::move(bundle), session_settings(*runtime, settings)),
       cancel_(runtime),
-      threads_(network_.threads()) {}
+      threads_(network_.threads()),
+      resting_(settings.average_frames) {}
 
 void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result) {
   check_input(depth, intrinsics);
@@ -100,6 +101,7 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
     depth_in_metres(window_of(depth, 0, top, field.width, rows),
                     field.depth_m.data() + size_t(top) * size_t(field.width));
   });
+  stats.averaged_pixels = resting_.add(field.depth_m.data(), field.intrinsics, threads_);
   stats.known_pixels = std::count_if(field.depth_m.begin(), field.depth_m.end(), [](float z) { return z > 0; });
   stats.depth_ms = float(stage.lap_ms());
 

@@ -10,6 +10,7 @@
 #include "edges/edge_field.h"
 #include "edges/edge_network.h"
 #include "edges/field_decode.h"
+#include "edges/resting_depth.h"
 #include "maquette/source.h"
 
 namespace maq {
@@ -20,10 +21,11 @@ struct EdgesSettings {
   bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
   bool skips_planes = false;
+  int average_frames = 1;
 };
 
 struct EdgesStats {
-  float depth_ms = 0;   // to metres
+  float depth_ms = 0;   // to metres, and the mean with frames before
   float skip_ms = 0;    // where the network must run
   float slopes_ms = 0;  // the network's input
   float network_ms = 0;
@@ -32,6 +34,7 @@ struct EdgesStats {
   int64_t known_pixels = 0;
   int64_t network_pixels = 0;  // that it was run on
   int64_t broken_pixels = 0;   // for which it gave no number
+  int64_t averaged_pixels = 0;  // whose depth is the mean of several frames
   maq_provider provider = MAQ_PROVIDER_CPU;
   int threads = 1;
   bool is_threads_measured = false;
@@ -72,6 +75,7 @@ class Edges {
   EdgeNetwork network_;
   RunCancel cancel_;
   WorkerThreads threads_;
+  RestingDepth resting_;
   ActiveWindow active_;
   DepthSlopes slopes_;
   FieldDecode decode_;

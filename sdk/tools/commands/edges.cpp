@@ -31,6 +31,7 @@ struct EdgesOptions {
   bool overlay = false;
   bool json = false;
   bool skip_planes = false;
+  int average = 0;
   FrameLimits limits;
 };
 
@@ -105,6 +106,7 @@ void print_frame(const EdgesOptions& options, const std::string& stem, const maq
                                  {"known_pixels", stats.known_pixel_count},
                                  {"network_pixels", stats.network_pixel_count},
                                  {"broken_pixels", stats.broken_pixel_count},
+                                 {"averaged_pixels", stats.averaged_pixel_count},
                                  {"provider", name_of(stats.provider)},
                                  {"threads", stats.threads},
                                  {"threads_measured", stats.is_threads_measured != 0},
@@ -175,6 +177,7 @@ int run_edges(const EdgesOptions& options) {
     config.threads = options.network.threads;
     config.allow_spinning = options.network.no_spin ? 0 : 1;
     config.skip_planes = options.skip_planes ? 1 : 0;
+    config.average_frames = options.average;
     config.provider = provider_of(options.network);
     edges = std::make_unique<maquette::Edges>(context, config);
   };
@@ -209,6 +212,10 @@ void add_edges_command(CLI::App& app, int* exit_code) {
   command->add_flag(
       "--skip-planes", options->skip_planes,
       "Run the network only where a plane does not explain the depth: faster, may miss flat creases in noise");
+  command
+      ->add_option("--average", options->average,
+                   "Take the mean of so many frames where nothing moves, 2 to 64: of a camera at rest, less noise")
+      ->check(CLI::Range(2, 64));
   add_frame_limits(*command, options->limits);
   command->footer(
       "Writes for each frame:\n"
@@ -232,6 +239,7 @@ void add_edges_command(CLI::App& app, int* exit_code) {
       "  maquette edges 'image:scan.tiff?depth_unit=1&fx=570&fy=570' --out results --format step,dxf\n"
       "  maquette edges 'stub:solids?scene=shelf&noise=tof' --out results --overlay --max-frames 60\n"
       "  maquette edges rec:desk.maqrec --out results --boxes --json\n"
+      "  maquette edges depthai: --out results --boxes --average 16 --max-frames 32\n"
       "  maquette edges build scan --out model.dxf\n"
       "  maquette edges info");
   command->require_subcommand(0, 1);

@@ -138,6 +138,11 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
   config = maquette::default_edges_config();
   config.allow_spinning = 2;
   refused(config, "config.allow_spinning");
+  for (const int32_t frames : {-1, 65}) {
+    config = maquette::default_edges_config();
+    config.average_frames = frames;
+    refused(config, "config.average_frames");
+  }
   config = maquette::default_edges_config();
   reinterpret_cast<int32_t&>(config.provider) = 9;
   refused(config, "config.provider");
@@ -166,6 +171,18 @@ TEST_F(ApiEdges, MeasuredThreadsAreAFewAndGiveTheSame) {
   ASSERT_EQ(maq_edges_result_get_stats(found.get(), &older), MAQ_OK);
   EXPECT_EQ(older.network_pixel_count, 96 * 72);
   EXPECT_EQ(older.threads, 0) << "behind the older struct";
+}
+
+TEST_F(ApiEdges, FramesAtRestAreAveragedWhenAskedFor) {
+  maq_edges_config config = maquette::default_edges_config();
+  config.bundle_path = kEdgesBundle;
+  for (const int32_t frames : {0, 1, 4}) {
+    config.average_frames = frames;
+    maquette::Edges edges_at_rest(context, config);
+    edges_at_rest.run(frame, image.intrinsics);
+    const maq_edges_stats stats = edges_at_rest.run(frame, image.intrinsics).stats();
+    EXPECT_EQ(stats.averaged_pixel_count, frames == 4 ? stats.known_pixel_count : 0);
+  }
 }
 
 TEST_F(ApiEdges, ABundleInMemoryGivesTheSame) {

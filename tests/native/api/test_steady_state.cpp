@@ -163,6 +163,7 @@ TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
     maq_edges_config config = maquette::default_edges_config();
     config.bundle_path = MAQ_TEST_DATA "/tiny_edges/bundle";
     config.skip_planes = skip_planes;
+    config.average_frames = 8;
     maquette::Edges edges(context, config);
     maquette::Source source(context, "stub:solids?scene=box&noise=tof");
     const maq_intrinsics intrinsics = *source.intrinsics();

@@ -87,6 +87,30 @@ def test_planes_are_skipped_when_asked_for(bundle, tmp_path):
     assert (found == EPS_R).all()
 
 
+def test_frames_of_a_camera_at_rest_are_averaged_when_asked_for(bundle, tmp_path):
+    rng = np.random.default_rng(4)
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    y, x = np.mgrid[:96, :128]
+    depth = 1 / (0.7 + 0.001 * x - 0.0008 * y)
+    for k in range(8):
+        noisy = depth * (1 + rng.normal(0, 1 / FOCAL_PX, depth.shape))
+        cv2.imwrite(str(folder / f"{k}.tiff"), noisy.astype(np.float32))
+    sources = [f"image:{folder}/{k}.tiff?depth_unit=1&fx={FOCAL_PX}" for k in range(8)]
+    command = [str(PROGRAM), "edges", *sources, "--bundle", str(bundle), "--out", str(tmp_path), "--json"]
+    counts = {}
+    for options in ((), ("--average", "8")):
+        run = subprocess.run([*command, *options], capture_output=True, text=True, check=True)
+        counts[options] = [json.loads(line)["averaged_pixels"] for line in run.stdout.splitlines()]
+    assert counts[()] == [0] * 8
+    alone, *rest = counts["--average", "8"]
+    assert alone == 0
+    assert min(rest) > 0.98 * depth.size
+    refused = subprocess.run([*command, "--average", "65"], capture_output=True, text=True)
+    assert refused.returncode != 0
+    assert "--average" in refused.stderr
+
+
 def test_the_lower_border_of_a_frame_that_is_no_multiple_is_no_edge(tmp_path):
     y, x = np.mgrid[:120, :212]  # 424 x 240 halved: 120 = 7.5 x 16, 212 = 13.25 x 16
     depth = (1 / (0.5 + 0.0018 * x - 0.0012 * y)).astype(np.float32)

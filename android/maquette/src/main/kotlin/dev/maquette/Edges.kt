@@ -23,6 +23,8 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
      * @property allowSpinning as of [DensePose.Config].
      * @property skipPlanes true: the network runs only where a plane does not explain the depth within the sensor's
      *   noise: faster, and may miss flat creases in noise.
+     * @property averageFrames 2 to 64: depth is the mean over so many frames of a camera at rest, which takes noise away;
+     *   what moves begins anew. 0: each frame is on its own.
      */
     data class Config(
         val threads: Int = 0,
@@ -30,6 +32,7 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
         val allowSpinning: Boolean = false,
         val provider: DensePose.Provider = DensePose.Provider.CPU,
         val skipPlanes: Boolean = false,
+        val averageFrames: Int = 0,
     ) {
         internal fun values() =
             doubleArrayOf(
@@ -38,6 +41,7 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
                 if (allowSpinning) 1.0 else 0.0,
                 provider.ordinal.toDouble(),
                 if (skipPlanes) 1.0 else 0.0,
+                averageFrames.toDouble(),
             )
     }
 
@@ -103,6 +107,7 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
         val provider: DensePose.Provider,
         val threads: Int,
         val isThreadsMeasured: Boolean,
+        val averagedPixels: Long,
     )
 
     /** Where distances end, in footprints. */
@@ -156,6 +161,7 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
             return Stats(
                 s[0], s[1], s[2], s[3], s[4], s[5], s[6].toLong(), s[7].toLong(), s[8].toLong(),
                 DensePose.Provider.entries[s[9].toInt()], s[10].toInt(), s[11] != 0.0,
+                s[12].toLong(),
             )
         }
 

@@ -129,6 +129,13 @@ class EdgesTest : AndroidTest() {
         }
 
     @Test
+    fun framesAtRestAreAveragedWhenAskedFor() =
+        withBox(Edges.Config(averageFrames = 8)) { _, edges, frame, intrinsics ->
+            edges.run(frame, intrinsics).use { assertEquals(0, it.stats.averagedPixels) }
+            edges.run(frame, intrinsics).use { assertEquals(it.stats.knownPixels, it.stats.averagedPixels) }
+        }
+
+    @Test
     fun wrongInputIsExplained() =
         withBox(Edges.Config(resultPoolSize = 2)) { maquette, edges, frame, intrinsics ->
             maquette.decode(TestFiles.photo.readBytes()).use { photo ->

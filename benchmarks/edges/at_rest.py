@@ -60,7 +60,7 @@ def _depth_of(result: object, shape: tuple[int, int]) -> np.ndarray:
 
 
 def measure_boxes(bundle: Path, seeds: int, level: str) -> dict[int, dict[str, float]]:
-    """By frames averaged, of cartons of stub:solids: which fraction has a box, median error of its sides in mm, and what
+    """By frames averaged, of cartons of stub:solids: which fraction has a box, median error of sides in mm, and what
     nine in ten are better than."""
     found, errors = ({count: [] for count in FRAMES} for _ in range(2))
     for seed in range(1, seeds + 1):

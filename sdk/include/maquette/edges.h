@@ -70,13 +70,13 @@ typedef struct maq_edges_stats {
   float network_ms;
   float decode_ms;
   float total_ms;
-  int64_t known_pixel_count;   /* whose depth is known */
-  int64_t network_pixel_count; /* that the network was run on; 0: nothing was known, or all was planes that were
-                                  skipped */
-  int64_t broken_pixel_count;  /* for which the network gave no number, but NaN: they have the distance eps_r */
-  maq_provider provider;       /* in use for the network */
-  int32_t threads;             /* of the network; fewer where the system starts no more, as the log says then */
-  int32_t is_threads_measured; /* 1: that number was chosen by MAQ_THREADS_MEASURED */
+  int64_t known_pixel_count;    /* whose depth is known */
+  int64_t network_pixel_count;  /* that the network was run on; 0: nothing was known, or all was planes that were
+                                   skipped */
+  int64_t broken_pixel_count;   /* for which the network gave no number, but NaN: they have the distance eps_r */
+  maq_provider provider;        /* in use for the network */
+  int32_t threads;              /* of the network; fewer where the system starts no more, as the log says then */
+  int32_t is_threads_measured;  /* 1: that number was chosen by MAQ_THREADS_MEASURED */
   int64_t averaged_pixel_count; /* whose depth is the mean of several frames (average_frames) */
 } maq_edges_stats;
 

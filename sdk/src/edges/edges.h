@@ -32,8 +32,8 @@ struct EdgesStats {
   float decode_ms = 0;
   float total_ms = 0;
   int64_t known_pixels = 0;
-  int64_t network_pixels = 0;  // that it was run on
-  int64_t broken_pixels = 0;   // for which it gave no number
+  int64_t network_pixels = 0;   // that it was run on
+  int64_t broken_pixels = 0;    // for which it gave no number
   int64_t averaged_pixels = 0;  // whose depth is the mean of several frames
   maq_provider provider = MAQ_PROVIDER_CPU;
   int threads = 1;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kArea_px = 32;
 constexpr int kMinKnown = 16;  // pixels of an area that both have, to tell what is motion there
-constexpr double kTrim = 4;    // mean absolute differences, beyond which a pixel has jumped and tells nothing of the rest
+constexpr double kTrim = 4;  // mean absolute differences, beyond which a pixel has jumped and tells nothing of the rest
 // The share of squared differences that a plane explains: of noise without relation 3 in 1,024; of that of stereo, of
 // which 7 x 7 pixels share one error, about 1 in 9.
 constexpr double kMotion = 0.4;

@@ -1,7 +1,7 @@
 // Depth of a camera at rest: for each pixel the mean of inverse depth over the last frames, as long as these agree.
 //
-// Noise of stereo and of time of flight is alike in inverse depth at all distances. What moves is told from noise by area:
-// differences from the mean that a plane explains are motion, what is left of them is noise.
+// Noise of stereo and of time of flight is alike in inverse depth at all distances. What moves is told from noise by
+// area: differences from the mean that a plane explains are motion, what is left of them is noise.
 #pragma once
 
 #include <cstdint>

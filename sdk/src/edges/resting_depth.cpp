@@ -9,12 +9,12 @@ namespace maq {
 namespace {
 
 constexpr int kArea_px = 32;
-constexpr int kMinKnown = 16;  // pixels of an area that both have, to tell what is motion there
+constexpr int kMinKnown_px = 16;  // pixels of an area that both have, to tell what is motion there
 constexpr double kTrim = 4;  // mean absolute differences, beyond which a pixel has jumped and tells nothing of the rest
 // The share of squared differences that a plane explains: of noise without relation 3 in 1,024; of that of stereo, of
 // which 7 x 7 pixels share one error, about 1 in 9.
 constexpr double kMotion = 0.4;
-constexpr float kJump = 5;  // mean absolute differences: 4 standard deviations
+constexpr float kJumpDifferences = 5;  // mean absolute differences: 4 standard deviations
 
 bool is_same(const Intrinsics& a, const Intrinsics& b) {
   return a.width_px == b.width_px && a.height_px == b.height_px && a.fx_px == b.fx_px && a.fy_px == b.fy_px &&
@@ -41,7 +41,7 @@ struct Sums {
 
   // Whether they are those of a surface that moved.
   bool is_motion() const {
-    if (n < kMinKnown) return true;  // nothing tells that it rests
+    if (n < kMinKnown_px) return true;  // nothing tells that it rests
     const double cxx = xx - x * x / n, cxy = xy - x * y / n, cyy = yy - y * y / n;
     const double cxd = dx - x * d / n, cyd = dy - y * d / n;
     const double determinant = cxx * cyy - cxy * cxy;
@@ -104,7 +104,7 @@ int64_t RestingDepth::add_area(float* metres, const Area& area) {
     limit = sums.n > 0 ? kTrim * sums.size / sums.n : 0;
   }
   const bool moved = sums.is_motion();
-  const float jump = sums.n > 0 ? kJump * float(sums.size / sums.n) : 0;
+  const float jump = sums.n > 0 ? kJumpDifferences * float(sums.size / sums.n) : 0;
   int64_t averaged = 0;
   for_each_pixel([&](int, int, size_t at) {
     if (!(metres[at] > 0)) {

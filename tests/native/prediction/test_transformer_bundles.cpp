@@ -69,7 +69,7 @@ TEST_F(TransformerBundles, WithOtherGraphsAreRefused) {
 
 void use_rows(const void* bytes, size_t count) {
   const maq::TransformerTables tables = maq::read_row_file(bytes, count, "transformer.maqr");
-  std::vector<float> sum(tables.places() * tables.embedding), near(maq::kNeighbours * tables.embedding),
+  std::vector<float> sum(tables.places() * tables.embedding), near(maq::kNearCodes * tables.embedding),
       earlier(tables.width);
   const std::vector<uint16_t> last(tables.places() * tables.slices, uint16_t(tables.entries - 1));
   maq::ContextFrames frames{};

@@ -53,6 +53,12 @@ class CheckedBytes {
   // Of float32. Throws for one that is not finite, or too large.
   std::vector<float> floats(size_t count);
 
+  // A number of the head that must be 1 to `max`. `what`: "slices".
+  size_t size_within(uint32_t value, size_t max, const char* what) const {
+    if (value < 1 || value > max) fail(" has ", value, " ", what, "; 1 to ", max, " are allowed.");
+    return value;
+  }
+
   // Throws unless everything was read.
   void end() const;
 

@@ -14,11 +14,6 @@ struct CodeFileHead {
 };
 static_assert(sizeof(CodeFileHead) == 48);
 
-size_t checked_size(const CheckedBytes& file, const char* what, uint32_t value, size_t max) {
-  if (value < 1 || value > max) file.fail(" has ", value, " ", what, "; 1 to ", max, " are allowed.");
-  return value;
-}
-
 }  // namespace
 
 FrameCodes read_code_file(const void* bytes, size_t count, const std::string& name) {
@@ -26,10 +21,10 @@ FrameCodes read_code_file(const void* bytes, size_t count, const std::string& na
   const auto head = file.head<CodeFileHead>(kCodeFileMagic, kCodeFileVersion, "a file of codes (.maqc)",
                                             "Export the bundle again, or use the Maquette that it was made for.");
   FrameCodes codes;
-  codes.slices = checked_size(file, "slices", head.slices, kMaxCodeSlices);
-  codes.entries = checked_size(file, "entries", head.entries, kMaxCodeEntries);
-  codes.width = checked_size(file, "numbers an entry", head.width, kMaxCodeWidth);
-  codes.side = checked_size(file, "places in a row", head.side, kMaxCodeSide);
+  codes.slices = file.size_within(head.slices, kMaxCodeSlices, "slices");
+  codes.entries = file.size_within(head.entries, kMaxCodeEntries, "entries");
+  codes.width = file.size_within(head.width, kMaxCodeWidth, "numbers an entry");
+  codes.side = file.size_within(head.side, kMaxCodeSide, "places in a row");
   codes.vectors = file.floats(codes.slices * codes.entries * codes.width);
   codes.frequency_bits = file.bytes(codes.slices * codes.entries);
   codes.after_bits = file.bytes(codes.slices * codes.entries * codes.entries);

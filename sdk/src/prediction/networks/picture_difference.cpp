@@ -11,7 +11,7 @@
 namespace maq {
 namespace {
 
-constexpr int kRowsOfTask = 16;
+constexpr int kTaskRows = 16;
 using Weights = std::array<float, 3>;  // of R, G and B
 
 // What each value of a plane's pixel is made of.
@@ -79,12 +79,12 @@ void PictureDifference::add(const float* difference, int side, const ImageView& 
         channels_[c * area + i] = weights[c][0] * rgb[0] + weights[c][1] * rgb[1] + weights[c][2] * rgb[2];
       }
     }
-    threads.run(size_t(divide_up(samples.height, kRowsOfTask)), [&, values = channels](size_t task, int worker) {
+    threads.run(size_t(divide_up(samples.height, kTaskRows)), [&, values = channels](size_t task, int worker) {
       Row& row = rows_[size_t(worker)];
       row.between.resize(size_t(side));
       row.wide.resize(size_t(samples.width));
-      const int end = std::min(int(task + 1) * kRowsOfTask, samples.height);
-      for (int y = int(task) * kRowsOfTask; y < end; ++y) {
+      const int end = std::min(int(task + 1) * kTaskRows, samples.height);
+      for (int y = int(task) * kTaskRows; y < end; ++y) {
         const float at =
             std::clamp((float(y) + 0.5f) * float(side) / float(samples.height) - 0.5f, 0.0f, float(side - 1));
         const size_t upper = size_t(at), lower = std::min(upper + 1, size_t(side - 1));

@@ -11,8 +11,8 @@
 namespace maq {
 namespace {
 
-constexpr size_t kLanes = 16;
-constexpr float kInfinity = std::numeric_limits<float>::infinity(), kLog2E = 1.44269504f;
+constexpr size_t kAtOnce = 16;
+constexpr float kInfiniteLogit = std::numeric_limits<float>::infinity(), kLog2E = 1.44269504f;
 
 MAQ_SIMD_CLONES void add_scaled(const uint8_t* bits, size_t entries, float scale, float* logits) {
   for (size_t i = 0; i < entries; ++i) logits[i] += scale * float(bits[i]);
@@ -20,12 +20,12 @@ MAQ_SIMD_CLONES void add_scaled(const uint8_t* bits, size_t entries, float scale
 
 // The largest; NaN where one is.
 MAQ_SIMD_CLONES float largest_of(const float* logits, size_t entries) {
-  float largest[kLanes];
-  int32_t is_nan[kLanes] = {};
-  std::fill_n(largest, kLanes, -kInfinity);
-  const size_t whole = entries - entries % kLanes;
-  for (size_t i = 0; i < whole; i += kLanes) {
-    for (size_t lane = 0; lane < kLanes; ++lane) {
+  float largest[kAtOnce];
+  int32_t is_nan[kAtOnce] = {};
+  std::fill_n(largest, kAtOnce, -kInfiniteLogit);
+  const size_t whole = entries - entries % kAtOnce;
+  for (size_t i = 0; i < whole; i += kAtOnce) {
+    for (size_t lane = 0; lane < kAtOnce; ++lane) {
       const float value = logits[i + lane];
       largest[lane] = value > largest[lane] ? value : largest[lane];
       is_nan[lane] |= value != value ? 1 : 0;
@@ -35,8 +35,8 @@ MAQ_SIMD_CLONES float largest_of(const float* logits, size_t entries) {
     largest[0] = std::max(largest[0], logits[i]);
     is_nan[0] |= std::isnan(logits[i]) ? 1 : 0;
   }
-  float found = -kInfinity;
-  for (size_t lane = 0; lane < kLanes; ++lane) {
+  float found = -kInfiniteLogit;
+  for (size_t lane = 0; lane < kAtOnce; ++lane) {
     if (is_nan[lane] != 0) return std::numeric_limits<float>::quiet_NaN();
     found = std::max(found, largest[lane]);
   }
@@ -54,10 +54,10 @@ MAQ_SIMD_CLONES void weights_of(const float* logits, size_t entries, float large
 }
 
 MAQ_SIMD_CLONES float sum_of(const float* values, size_t count) {
-  float sums[kLanes] = {};
-  const size_t whole = count - count % kLanes;
-  for (size_t i = 0; i < whole; i += kLanes) {
-    for (size_t lane = 0; lane < kLanes; ++lane) sums[lane] += values[i + lane];
+  float sums[kAtOnce] = {};
+  const size_t whole = count - count % kAtOnce;
+  for (size_t i = 0; i < whole; i += kAtOnce) {
+    for (size_t lane = 0; lane < kAtOnce; ++lane) sums[lane] += values[i + lane];
   }
   float sum = 0;
   for (size_t i = whole; i < count; ++i) sum += values[i];

@@ -12,7 +12,7 @@
 namespace maq {
 namespace {
 
-constexpr float kInfinite = std::numeric_limits<float>::infinity();
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 constexpr float kUnit = 1 << 30;  // the weight of the likeliest
 
 // Two loops: in one, the compiler would branch at the limit, and make no vectors.
@@ -48,7 +48,7 @@ uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   if (std::isinf(largest)) {  // of +infinite ones each; where all are -infinite, each of all
     std::transform(logits, logits + entries, weights_.begin(), [&](float l) { return l == largest ? kUnit : 0.0f; });
   } else if (std::isinf(temperature)) {
-    std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kInfinite ? kUnit : 0.0f; });
+    std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kUnbounded ? kUnit : 0.0f; });
   } else {
     weigh(logits, entries, largest, temperature, weights_.data());
   }

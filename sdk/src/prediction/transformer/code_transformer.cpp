@@ -26,12 +26,12 @@ CodeTransformer::CodeTransformer(std::shared_ptr<const OnnxRuntimeLibrary> runti
   for (const TransformerBundle::Graph& head : parts_.heads) heads_.push_back(head.open(runtime_, whole));
 
   summed_.resize(tables.places() * tables.embedding);
-  near_.resize(tables.places() * kNeighbours * tables.embedding);
+  near_.resize(tables.places() * kNearCodes * tables.embedding);
   earlier_.resize(tables.places() * tables.width);
   logits_.resize(tables.entries);
   context_inputs_ = {{summed_.data(), {1, places, embedding}}, {&time_step_, {1, 1}}};
   context_outputs_ = {{1, places, width}};
-  slice_inputs_ = {{nullptr, {1, places, width}}, {near_.data(), {1, places, int64_t(kNeighbours) * embedding}}};
+  slice_inputs_ = {{nullptr, {1, places, width}}, {near_.data(), {1, places, int64_t(kNearCodes) * embedding}}};
   slice_outputs_ = {{1, places, width}};
   for (size_t layer = 0; layer < tables.layers; ++layer) {
     // No key is kept; where the memory of none lies does not matter.
@@ -64,7 +64,7 @@ void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, flo
   see_context(before);
   for (size_t place = 0; place < tables.places(); ++place) rows_.set(place, codes + place * tables.slices);
   for (size_t place = 0; place < tables.places(); ++place) {
-    rows_.near(place, near_.data() + place * kNeighbours * tables.embedding);
+    rows_.near(place, near_.data() + place * kNearCodes * tables.embedding);
   }
   head_inputs_[0].data = slices_->run(slice_inputs_, slice_outputs_)[0].data;
   for (size_t k = 0; k < tables.slices; ++k) {

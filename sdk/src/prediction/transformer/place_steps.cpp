@@ -11,14 +11,14 @@ PlaceSteps::PlaceSteps(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime,
   const TransformerTables& tables = parts.tables;
   const auto places = int64_t(tables.places()), count = int64_t(samples), width = int64_t(tables.width),
              heads = int64_t(tables.heads), of_head = int64_t(parts.head_width),
-             near = int64_t(kNeighbours * tables.embedding);
+             near = int64_t(kNearCodes * tables.embedding);
   settings.threads = 1;  // one place is too little for more
   settings.fixed_sizes = {{"samples", count}, {"rows", 1}, {"kept", places}, {"kept_and_rows", places + 1}};
   slices_ = parts.slices.open(runtime, settings);
   for (const TransformerBundle::Graph& head : parts.heads) heads_.push_back(head.open(runtime, settings));
 
   context_.resize(samples * tables.width);
-  near_.resize(samples * kNeighbours * tables.embedding);
+  near_.resize(samples * kNearCodes * tables.embedding);
   earlier_.resize(samples * tables.width);
   keys_.assign(tables.layers, std::vector<float>(samples * tables.heads * tables.places() * parts.head_width));
   values_ = keys_;
@@ -52,7 +52,7 @@ void PlaceSteps::see(size_t place, const float* context) {
   const size_t places = tables.places(), of_head = parts_.head_width;
   for (size_t sample = 0; sample < samples(); ++sample) {
     std::copy_n(context, tables.width, context_.data() + sample * tables.width);
-    rows_[sample].near(place, near_.data() + sample * kNeighbours * tables.embedding);
+    rows_[sample].near(place, near_.data() + sample * kNearCodes * tables.embedding);
   }
   for (size_t layer = 0; layer < tables.layers; ++layer) {
     for (size_t head = 0; head < tables.heads; ++head) {

@@ -15,11 +15,6 @@ struct RowFileHead {
 };
 static_assert(sizeof(RowFileHead) == 72);
 
-size_t checked_size(const CheckedBytes& file, const char* what, uint32_t value, size_t max) {
-  if (value < 1 || value > max) file.fail(" has ", value, " ", what, "; 1 to ", max, " are allowed.");
-  return value;
-}
-
 // As they are, or as bytes with a scale a row.
 std::vector<float> read_rows(CheckedBytes& file, uint32_t row_bytes, size_t rows, size_t width) {
   if (row_bytes == 4) return file.floats(rows * width);
@@ -39,15 +34,15 @@ TransformerTables read_row_file(const void* bytes, size_t count, const std::stri
   const auto head = file.head<RowFileHead>(kRowFileMagic, kRowFileVersion, "a file of rows (.maqr)",
                                            "Export the bundle again, or use the Maquette that it was made for.");
   TransformerTables tables;
-  tables.slices = checked_size(file, "slices", head.slices, kMaxCodeSlices);
-  tables.entries = checked_size(file, "entries", head.entries, kMaxCodeEntries);
-  tables.side = checked_size(file, "places in a row", head.side, kMaxCodeSide);
-  tables.before = checked_size(file, "frames before", head.before, kMaxContextFrames - 1);
-  tables.frames = checked_size(file, "frames", head.frames, kMaxContextFrames);
-  tables.embedding = checked_size(file, "numbers a row", head.embedding, 1024);
-  tables.width = checked_size(file, "features a place", head.width, 4096);
-  tables.layers = checked_size(file, "layers", head.layers, 64);
-  tables.heads = checked_size(file, "heads", head.heads, 64);
+  tables.slices = file.size_within(head.slices, kMaxCodeSlices, "slices");
+  tables.entries = file.size_within(head.entries, kMaxCodeEntries, "entries");
+  tables.side = file.size_within(head.side, kMaxCodeSide, "places in a row");
+  tables.before = file.size_within(head.before, kMaxContextFrames - 1, "frames before");
+  tables.frames = file.size_within(head.frames, kMaxContextFrames, "frames");
+  tables.embedding = file.size_within(head.embedding, 1024, "numbers a row");
+  tables.width = file.size_within(head.width, 4096, "features a place");
+  tables.layers = file.size_within(head.layers, 64, "layers");
+  tables.heads = file.size_within(head.heads, 64, "heads");
   if (tables.frames != tables.before && tables.frames != tables.before + 1) {
     file.fail(" has ", tables.frames, " frames, of which ", tables.before, " are the stream's.");
   }

@@ -41,8 +41,8 @@ void SliceRows::set(size_t place, const uint16_t* codes) {
 
 void SliceRows::near(size_t place, float* near) const {
   const size_t embedding = tables_.embedding, up = side_ + 2, here = at(place);
-  const size_t neighbours[kNeighbours] = {here - 2 * up - 1, here - 2 * up, here - 2 * up + 1, here - up - 1,
-                                          here - up,         here - up + 1, here - 1};
+  const size_t neighbours[kNearCodes] = {here - 2 * up - 1, here - 2 * up, here - 2 * up + 1, here - up - 1,
+                                         here - up,         here - up + 1, here - 1};
   for (const size_t neighbour : neighbours) near = std::copy_n(grid_.data() + neighbour * embedding, embedding, near);
 }
 

@@ -18,7 +18,7 @@ using ContextFrames = std::array<const uint16_t*, kMaxContextFrames>;
 void sum_context_rows(const TransformerTables& tables, const ContextFrames& frames, float* summed);
 
 // Places that the slice network sees beside its kept keys and values: two rows above, three wide, and the left one.
-inline constexpr size_t kNeighbours = 7;
+inline constexpr size_t kNearCodes = 7;
 
 // A frame that is made place after place, row by row.
 class SliceRows {
@@ -27,7 +27,7 @@ class SliceRows {
 
   // Codes of a place, [slices]. A place is seen by those after it, whatever is set there later.
   void set(size_t place, const uint16_t* codes);
-  // Of a place: [kNeighbours][embedding], zeros beyond the frame.
+  // Of a place: [kNearCodes][embedding], zeros beyond the frame.
   void near(size_t place, float* near) const;
 
  private:

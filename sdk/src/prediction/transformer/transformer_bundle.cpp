@@ -84,7 +84,7 @@ TransformerBundle::TransformerBundle(const CodeBundle& bundle)
   head_width = size_t(head_width_of(slices.spec));
   const auto heads_count = int64_t(tables.heads), of_head = int64_t(head_width);
   Tensors inputs{tensor("context", {"samples", "rows", width}),
-                 tensor("near", {"samples", "rows", int64_t(kNeighbours) * embedding})};
+                 tensor("near", {"samples", "rows", int64_t(kNearCodes) * embedding})};
   Tensors outputs{tensor("features", {"samples", "rows", width})};
   for (size_t layer = 0; layer < tables.layers; ++layer) {
     const std::string number = std::to_string(layer);

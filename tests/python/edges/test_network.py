@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from box_crops import write_crops
 
 from export.bundle import read_manifest
+from export.edges.between import between, measure_statistics
 from export.edges.bundle import write_manifest
 from export.edges.config import EPS_R, SIZES, NetworkConfig
+from export.edges.data import Batches
 from export.edges.export_onnx import BundleInfo, export
 from export.edges.graph_field import field_of_planes, slopes_of
 from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
@@ -146,6 +149,28 @@ def test_a_deeper_network_starts_with_the_field_of_the_trained_one_and_comes_bac
     assert config == deeper
     torch.testing.assert_close(again(planes), network(planes))
     assert export(network, tmp_path, deeper.multiple) < 1e-4
+
+
+def test_a_network_between_two_is_either_at_its_ends_and_has_statistics_of_its_own(tmp_path):
+    first, deeper = EdgeNetwork(TINY), replace(TINY, blocks=(1, 1))
+    save_network(first, TINY, tmp_path / "first.pt")
+    second = EdgeNetwork(deeper)
+    start_from(tmp_path / "first.pt", second)
+    for parameter in second.parameters():
+        torch.nn.init.normal_(parameter, std=0.3)
+    save_network(second, deeper, tmp_path / "second.pt")
+    planes = torch.rand(1, 12, 32, 32)
+    at_ends = [between(tmp_path / "first.pt", tmp_path / "second.pt", at)(planes) for at in (0, 1)]
+    torch.testing.assert_close(at_ends[0], first.eval()(planes))
+    torch.testing.assert_close(at_ends[1], second.eval()(planes))
+    middle = between(tmp_path / "first.pt", tmp_path / "second.pt", 0.5)
+    torch.testing.assert_close(middle.head.weight, (first.head.weight + second.head.weight) / 2)
+    torch.testing.assert_close(middle.deep[0][0].first[0].weight, second.deep[0][0].first[0].weight)
+    measure_statistics(middle, Batches(write_crops(tmp_path / "crops", 0, 8), 48, 4, seed=0), 3)
+    norm = middle.stem[0][1]
+    assert norm.num_batches_tracked == 3
+    assert not torch.allclose(norm.running_mean, second.stem[0][1].running_mean)
+    assert not any(module.training for module in middle.modules())
 
 
 def test_a_start_from_another_network_is_refused(tmp_path):

@@ -131,7 +131,7 @@ class EdgesTest : AndroidTest() {
     @Test
     fun framesAtRestAreAveragedWhenAskedFor() =
         withBox(Edges.Config(averageFrames = 8)) { _, edges, frame, intrinsics ->
-            edges.run(frame, intrinsics).use { assertEquals(0, it.stats.averagedPixels) }
+            edges.run(frame, intrinsics).use { assertEquals(0L, it.stats.averagedPixels) }
             edges.run(frame, intrinsics).use { assertEquals(it.stats.knownPixels, it.stats.averagedPixels) }
         }
 

@@ -49,8 +49,8 @@ class NetworkPredictor {
   void push(const Frame& frame);
   // As Predictor::predict(). The picture that the last frame and motion foresee is changed by what the networks'
   // picture differs from what they make of that one: their own error then mostly cancels, and what they cannot see
-  // stays. Nothing is changed while nothing moves, and before the second frame. Throws what that and the networks
-  // throw.
+  // stays; of what the mended picture differs from it only half is taken. Nothing is changed while nothing moves, and
+  // before the second frame. Throws what that and the networks throw.
   void predict(int64_t ahead_ns, Frame& frame);
   void reset();
 

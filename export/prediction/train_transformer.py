@@ -145,12 +145,11 @@ def transformer_bits(net: LatentTransformer, clips: CodedClips, clip: Tensor, t:
 def bits_of(net: LatentTransformer, table: CodeTable, clips: CodedClips, count: int) -> dict[str, float]:
     """A code, on the same frames of held-out clips."""
     clip, t = held_out_frames(clips, count)
-    figures = {
+    return {
         "transformer": float(transformer_bits(net, clips, clip, t).mean()),
         "table": float(bits_by_table(table, clips.codes)[clip, t - 1].mean()),
         "frequency": float(bits_by_frequency(table, clips.codes)[clip, t - 1].mean()),
     }
-    return figures
 
 
 @torch.no_grad()

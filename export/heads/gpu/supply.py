@@ -2,7 +2,7 @@
 
 The file (`export.heads.gpu.pack`) has the shapes of the training heads, as sums of a few bases, and the skin. Here each
 of them gets hair, tones and cameras anew whenever it is drawn. It takes numpy and scipy alone: what is inside other
-parts is left in, since nobody sees it.
+parts is left in: it is not visible.
 """
 
 from __future__ import annotations

@@ -67,8 +67,7 @@ def test_motion_foresees_a_square_that_moves():
 
 
 def test_codes_are_those_of_the_frames_their_mirror_images_and_what_motion_predicts(clips, coded):
-    net = Autoencoder(SMALL).eval()
-    torch.manual_seed(0)
+    torch.manual_seed(0)  # the network of `coded`
     net = Autoencoder(SMALL).eval()
     assert coded.names == ["a/0", "a/0 mirrored", "a/1", "a/1 mirrored"]
     assert torch.equal(coded.codes[2].long(), net.encode(clips.frames[1]))

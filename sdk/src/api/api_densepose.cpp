@@ -191,7 +191,7 @@ maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, ma
     require_argument(result, "result");
     require_argument(pixels, "pixels");
     require_argument(stride_bytes, "stride_bytes");
-    require_range("plane", int(plane), int(MAQ_DENSEPOSE_PLANE_PART), int(MAQ_DENSEPOSE_PLANE_PERSON));
+    require_range("plane", number_in(plane), int32_t(MAQ_DENSEPOSE_PLANE_PART), int32_t(MAQ_DENSEPOSE_PLANE_PERSON));
     const DensePlanes& planes = result->result.planes;
     const std::vector<uint8_t>* all[] = {&planes.part, &planes.u, &planes.v, &planes.person};
     *pixels = all[plane - MAQ_DENSEPOSE_PLANE_PART]->data();

@@ -48,7 +48,7 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
     require_argument(given, "desc");
     require_argument(frame, "frame");
     const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{}, sizeof(maq_frame_desc));
-    require_range("desc.clock", int(desc.clock), int(MAQ_CLOCK_MEDIA), int(MAQ_CLOCK_MONOTONIC));
+    require_range("desc.clock", number_in(desc.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
     auto handle = std::make_unique<maq_frame>();
     handle->frame.image = checked_image_view(desc);
     handle->frame.timestamp_ns = desc.timestamp_ns;

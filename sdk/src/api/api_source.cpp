@@ -27,8 +27,8 @@ maq_source_config default_source_config() {
   return config;
 }
 
-void require_control(maq_control control) {
-  require_range("control", int(control), int(MAQ_CONTROL_AUTO_EXPOSURE), int(MAQ_CONTROL_BRIGHTNESS));
+void require_control(const maq_control& control) {
+  require_range("control", number_in(control), int32_t(MAQ_CONTROL_AUTO_EXPOSURE), int32_t(MAQ_CONTROL_BRIGHTNESS));
 }
 
 }  // namespace

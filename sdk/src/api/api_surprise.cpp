@@ -53,7 +53,7 @@ maq_surprise_config default_surprise_config() {
 }
 
 void require_method(const maq_surprise_config& config) {
-  require_range("config.method", int(config.method), int(MAQ_SURPRISE_AUTO), int(MAQ_SURPRISE_TABLE));
+  require_range("config.method", number_in(config.method), int32_t(MAQ_SURPRISE_AUTO), int32_t(MAQ_SURPRISE_TABLE));
 }
 
 SurpriseNetworks open_networks(ContextState& state, const maq_surprise_config& config) {

@@ -73,6 +73,7 @@ def stored_head(
         anchor_sigma(prior, covariance).astype(np.float32),
         prior.places,
         prior_sha256,
+        code_factor=np.linalg.cholesky(covariance)[np.tril_indices(len(shape))].astype(np.float32),
     )
 
 

@@ -1,5 +1,5 @@
-"""Head files (.maqh) in numpy: written and read. The layout is that of sdk/src/head/files/file_format.h, version 1
-(docs/formats.md)."""
+"""Head files (.maqh) in numpy: written and read, of version 1 read alone. The layout is that of
+sdk/src/head/files/file_format.h, version 2 (docs/formats.md)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from export.checked_file import START, checked_head, signed, write_whole
 from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, FieldShape, Layer, PriorError
 from export.heads.stored_numbers import FLOATS, SHAPE, NumberReader, shape_of, stored, stored_layer, stored_place
 
-MAGIC, VERSION, MAX_CAMERAS = b"MAQHED\r\n", 1, 256
+MAGIC, FIRST_VERSION, VERSION, MAX_CAMERAS = b"MAQHED\r\n", 1, 2, 256
 SCALE_SOURCES = ("prior", "given", "depth")
 HEAD = np.dtype(
     [
@@ -26,7 +26,8 @@ HEAD = np.dtype(
         ("sharpness", "<f4"),
         ("scale_source", "u1"),
         ("has_texture", "u1"),
-        ("zero", "u1", 2),
+        ("has_code_factor", "u1"),  # 0 in version 1
+        ("zero", "u1"),
         ("metres_per_unit", "<f8"),
         ("metres_sigma", "<f8"),
         ("cut_point", "<f8", 3),
@@ -78,6 +79,9 @@ class StoredHead:
     prior_sha256: str  # of the prior's file, which the codes belong to; zeros: not known
     texture_px: int = 0  # a side; 0: there is no texture
     texture: bytes = b""  # a JPEG file
+    # [K (K + 1) / 2] of K shape codes: the Cholesky factor of their covariance, lower triangle, row by row; None: not
+    # known, and no photo can be added.
+    code_factor: np.ndarray | None = None
 
 
 def head_bytes(head: StoredHead) -> bytes:
@@ -91,10 +95,13 @@ def head_bytes(head: StoredHead) -> bytes:
     stored_head["places"] = len(head.places)
     stored_head["scale_source"] = SCALE_SOURCES.index(head.scale_source)
     stored_head["has_texture"] = head.texture_px > 0
+    stored_head["has_code_factor"] = head.code_factor is not None
     stored_head["prior_sha256"] = np.frombuffer(bytes.fromhex(head.prior_sha256), np.uint8)
     try:
         parts = [part for layer in head.layers for part in stored_layer(layer, "float16")]
         parts += [stored(codes, "float32") for codes in (head.shape_codes, head.colour_codes)]
+        if head.code_factor is not None:
+            parts.append(stored(head.code_factor, "float16"))
         parts.append(np.ascontiguousarray(head.cameras, CAMERA).tobytes())
         parts += [stored(a, "float16") for a in (head.template_points, head.anchor_points, head.anchor_sigma)]
         parts += [part for name, point in head.places.items() for part in stored_place(name, point)]
@@ -124,19 +131,22 @@ def read_head(path: Path) -> StoredHead:
 
 
 def _read(data: bytes, name: str) -> StoredHead:
-    head = checked_head(data, HEAD, MAGIC, VERSION, name, "a head (.maqh)", PriorError)
+    version = FIRST_VERSION if data[8:12] == np.uint32(FIRST_VERSION).tobytes() else VERSION
+    head = checked_head(data, HEAD, MAGIC, version, name, "a head (.maqh)", PriorError)
     shape = shape_of(head["shape"])
     counts = [int(head[key]) for key in ("shape_codes", "colour_codes", "cameras", "anchors", "places")]
     if any(
         n > limit for n, limit in zip(counts, (MAX_CODES, MAX_CODES, MAX_CAMERAS, MAX_ANCHORS, MAX_PLACES), strict=True)
     ):
         raise HeadFileError(f"{name} claims more codes, cameras, anchors or places than a head may have.")
-    if head["zero"].any() or head["has_texture"] > 1 or head["scale_source"] >= len(SCALE_SOURCES):
-        raise HeadFileError(f"{name} stores its numbers in a way that version {VERSION} does not have.")
+    has_other = head["zero"] > 0 or head["has_texture"] > 1 or head["has_code_factor"] > version - FIRST_VERSION
+    if has_other or head["scale_source"] >= len(SCALE_SOURCES):
+        raise HeadFileError(f"{name} stores its numbers in a way that version {version} does not have.")
     single, half = FLOATS[0], FLOATS[1]
     read = NumberReader(data, HEAD.itemsize, name)
     layers = [read.layer(shape, index, (), 1) for index in range(shape.layers)]
     codes = [read.numbers((count,), single) for count in counts[:2]]
+    factor = read.numbers((counts[0] * (counts[0] + 1) // 2,), half) if head["has_code_factor"] else None
     cameras = read.records(counts[2], CAMERA)
     points, on_head = (read.numbers((counts[3], 3), half) for _ in range(2))
     sigma = read.numbers((counts[3],), half)
@@ -163,4 +173,5 @@ def _read(data: bytes, name: str) -> StoredHead:
         head["prior_sha256"].tobytes().hex(),
         texture_px,
         texture,
+        factor,
     )

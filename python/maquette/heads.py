@@ -130,7 +130,7 @@ class Head(NativeObject):
         return Head(native().create(*arguments, function="maq_head_scale_by_depth"))
 
     def save(self, path: str | Path) -> None:
-        """Writes a head file (.maqh), some 60 KB and the texture, atomically. Raises MaquetteError."""
+        """Writes a head file (.maqh), some 64 KB and the texture, atomically. Raises MaquetteError."""
         native().call("maq_head_save", self.handle, str(path).encode())
 
     def export(self, path: str | Path, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
@@ -262,8 +262,16 @@ class HeadBuilder(NativeObject):
         frame = as_frame(image)
         n.call("maq_head_builder_add_photo", self.handle, frame.handle, n.config("maq_head_photo", settings))
 
+    def add_head(self, head: Head) -> None:
+        """Adds the photos of this builder to those that `head` was fitted to, which are not needed: later fits go on
+        from what they said. head: of the same person, fitted with the same bundle, such as one from a file; another
+        takes its place. Its cameras come first in the head that is fitted, and a size that was known stays. Raises
+        MaquetteError, with the status MAQ_ERROR_UNSUPPORTED for a head of another bundle, or from a file of
+        version 1."""
+        native().call("maq_head_builder_add_head", self.handle, head.handle)
+
     def clear(self) -> None:
-        """Forgets the photos, for a head of another person."""
+        """Forgets the photos, and the head that they would be added to, for a head of another person."""
         native().call("maq_head_builder_clear", self.handle)
 
     def fit(

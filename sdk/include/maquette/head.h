@@ -197,7 +197,15 @@ MAQ_API void maq_head_builder_destroy(maq_head_builder* builder);
 MAQ_API maq_status maq_head_builder_add_photo(maq_head_builder* builder, const maq_frame* frame,
                                               const maq_head_photo* photo);
 
-/* Forgets the photos, for a head of another person.
+/* Adds the photos of this builder to those that `head` was fitted to: later fits go on from what these said, without
+ * having them. It must be of the same person, fitted with the same bundle; one head at most: another takes its place. A
+ * fit then has the cameras of `head` first, as they were, and a head of known size keeps it; of colours the photos of
+ * this builder say more. With a texture asked for, that of `head` shows what they do not see. `head` is not kept.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (it has more than 192 photos), MAQ_ERROR_UNSUPPORTED (it is of
+ * another bundle, or from a file of version 1). Blocks for some milliseconds. */
+MAQ_API maq_status maq_head_builder_add_head(maq_head_builder* builder, const maq_head* head);
+
+/* Forgets the photos, and the head that they would be added to, for a head of another person.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_builder_clear(maq_head_builder* builder);
 
@@ -234,7 +242,7 @@ MAQ_API maq_status maq_head_open(maq_context* context, const char* path, maq_hea
  * MAQ_ERROR_NOT_FOUND. */
 MAQ_API maq_status maq_head_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_head** head);
 
-/* Writes the head to a file, some 60 KB and its texture (docs/formats.md), which appears atomically and replaces an
+/* Writes the head to a file, some 64 KB and its texture (docs/formats.md), which appears atomically and replaces an
  * existing one. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks while it is written. */
 MAQ_API maq_status maq_head_save(const maq_head* head, const char* path);
 

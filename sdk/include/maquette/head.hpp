@@ -135,6 +135,8 @@ class HeadBuilder {
   void add_photo(const Frame& frame, const maq_head_photo& photo = default_head_photo()) {
     check(maq_head_builder_add_photo(get(), frame.get(), &photo));
   }
+  // Adds the photos to those that `head` was fitted to.
+  void add_head(const Head& head) { check(maq_head_builder_add_head(get(), head.get())); }
   void clear() { check(maq_head_builder_clear(get())); }
 
   // `progress` gets the fraction that is done and returns whether to go on; what it throws ends the fit and is thrown.

@@ -68,6 +68,12 @@ std::string stored_head_fault(const StoredHead& head) {
       return concatenate("it has more than ", kMaxFieldCodes, " codes, or one that is not finite");
     }
   }
+  // No photo makes a code less sure than it is a priori.
+  if (const size_t codes = head.codes.shape.size();
+      !head.code_factor.empty() &&
+      (head.code_factor.size() != codes * (codes + 1) / 2 || !are_within(head.code_factor, -1.01f, 1.01f))) {
+    return "the covariance of its codes is of another size, or larger than that of any head";
+  }
   if (head.cameras.size() > kMaxStoredCameras) {
     return concatenate("it has ", head.cameras.size(), " cameras, but may have ", kMaxStoredCameras);
   }

@@ -50,8 +50,11 @@ inline constexpr size_t kMaxTextureBytes = 6 << 20;
 struct StoredHead {
   explicit StoredHead(FieldWeights of_head) : weights(std::move(of_head)) {}
 
-  FieldWeights weights;             // combined
-  FieldCodes codes;                 // what they were combined from, for a fit that goes on
+  FieldWeights weights;  // combined
+  FieldCodes codes;      // what they were combined from, for a fit that goes on
+  // How sure the photos made the shape codes: the Cholesky factor of their covariance, lower triangle, row by row.
+  // Empty: not known, and no photo can be added.
+  std::vector<float> code_factor;
   std::vector<HeadCamera> cameras;  // of its photos
   HeadScale scale;
   float sharpness = 64;  // s of the opacity along rays, 1/dm

@@ -303,6 +303,40 @@ TEST_F(ApiHeads, HeadsOutliveTheirBuilderAndAreSavedAndOpened) {
   EXPECT_NEAR(opened.mesh(of_cell(0.008)).vertex_count, head.mesh(of_cell(0.008)).vertex_count, 30);
 }
 
+TEST_F(ApiHeads, PhotosAreAddedToAHeadFromAFile) {
+  const TempFolder folder;
+  fitted().scaled_by_distance("pupil_left", "pupil_right", 0.06).save(folder.file("a.maqh"));
+  const maquette::Head first = maquette::Head::open(context, folder.file("a.maqh"));
+  builder.clear();
+  builder.add_head(first);
+  maq_head* none = nullptr;
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("no photos");
+  builder.add_photo(frame, with_box(100, 50, 210, 200));
+  const maquette::Head both = builder.fit(0);
+  EXPECT_EQ(both.info().photo_count, 2u);
+  EXPECT_EQ(builder.stats().used_photo_count, 1u);
+  EXPECT_EQ(both.camera(0).intrinsics.fx_px, first.camera(0).intrinsics.fx_px) << "that of its photo, as it was";
+  EXPECT_EQ(both.info().scale, MAQ_HEAD_SCALE_GIVEN);
+  EXPECT_NEAR(2 * both.landmark("pupil_left").point_m[0], 0.06, 0.001);
+  EXPECT_LT(both.landmark("nose_tip").sigma_m, first.landmark("nose_tip").sigma_m);
+  both.save(folder.file("a.maqh"));
+  EXPECT_EQ(maquette::Head::open(context, folder.file("a.maqh")).info().photo_count, 2u) << "and so on";
+  builder.clear();
+  builder.add_photo(frame, known);
+  EXPECT_EQ(builder.fit(0).info().photo_count, 1u) << "forgotten";
+
+  builder.clear();
+  builder.add_head(first);
+  builder.add_photo(blue_frame, known);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &none), MAQ_ERROR_NOT_FOUND) << "a mirrored head";
+  maquette::HeadBuilder of_another_bundle(context, MAQ_TEST_MODELS "/heads-int8");
+  EXPECT_EQ(maq_head_builder_add_head(of_another_bundle.get(), first.get()), MAQ_ERROR_UNSUPPORTED);
+  expect_text("another bundle");
+  EXPECT_EQ(maq_head_builder_add_head(builder.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("head");
+}
+
 TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
   maquette::Head head = fitted();
   const auto count = [&](double cell_m, uint32_t triangles) {

@@ -54,6 +54,17 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   EXPECT_GT(document["landmarks"]["crown"]["point_m"][2], 0.08);
 }
 
+TEST_F(HeadCommandLine, PhotosAreAddedToASavedHead) {
+  const std::string made = "grey.png --box 110,60,200,180 --seconds 0 --save a.maqh ";
+  ASSERT_EQ(run(made).exit_code, 0);
+  const Outcome added = run(made + "--add a.maqh");
+  ASSERT_EQ(added.exit_code, 0) << added.err;
+  EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2);
+  expect_error(made + "--add none.maqh", 1, "none.maqh");
+  expect_error(made + "--add a.maqh --person all", 1, "--add is one person's head");
+  EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2) << "what was there stays";
+}
+
 TEST_F(HeadCommandLine, ADistanceOrADepthImageGivesTheSize) {
   const std::string photo = "grey.png --box 110,60,200,180 --seconds 0 --json --save a.maqh ";
   const auto given = nlohmann::json::parse(run(photo + "--pupils 70").out);

@@ -33,6 +33,7 @@ StoredHead example(const FieldShape& shape, int anchors, int cameras) {
     }
   }
   head.codes = {{0.1f, -1.7f, 2.3f}, {0.3f, -0.01f}};
+  head.code_factor = {0.5f, -0.125f, 0.75f, 0.25f, 0.0625f, 1};
   for (int i = 0; i < cameras; ++i) {
     HeadCamera camera;
     const Mat3 facing_y = {1, 0, 0, 0, 0, -1, 0, 1, 0};
@@ -85,6 +86,7 @@ TEST(HeadFiles, HoldAllOfAHead) {
   EXPECT_EQ(again.weights.values(), head.weights.values());
   EXPECT_EQ(again.codes.shape, head.codes.shape);
   EXPECT_EQ(again.codes.colour, head.codes.colour);
+  EXPECT_EQ(again.code_factor, head.code_factor);
   ASSERT_EQ(again.cameras.size(), 2u);
   for (size_t i = 0; i < 2; ++i) {
     const HeadCamera &found = again.cameras[i], &camera = head.cameras[i];
@@ -144,8 +146,28 @@ TEST(HeadFiles, AreTheOnesThatPythonReads) {
       << "the file of an example is not what lies in " << tiny_head::kFolder;
 }
 
+TEST(HeadFiles, OfVersion1AreReadAndDoNotSayHowSureTheyAre) {
+  const std::string bytes = read_text(tiny_head::kFolder + "/example_version_1.maqh");
+  StoredHead head = read_head(bytes.data(), bytes.size(), "a.maqh");
+  EXPECT_TRUE(head.code_factor.empty());
+  EXPECT_EQ(head.codes.shape, example().codes.shape);
+  head.code_factor = example().code_factor;
+  EXPECT_EQ(bytes_of(head), bytes_of(example())) << "all else is as it is now";
+  std::string changed = bytes;
+  HeadFileHead start;
+  std::memcpy(&start, changed.data(), sizeof start);
+  start.has_code_factor = 1;
+  std::memcpy(changed.data(), &start, sizeof start);
+  checked_file_damage::repair(changed);
+  expect_error(MAQ_ERROR_UNREADABLE, "in a way that version 1",
+               [&] { read_head(changed.data(), changed.size(), "a.maqh"); });
+}
+
 TEST(HeadFiles, OfTheDefaultFieldTakeLessThan64KiB) {
-  EXPECT_LT(head_file_bytes(example({}, 800, 5)).size(), size_t(64) << 10);
+  StoredHead head = example({}, 800, 5);
+  head.codes.shape.resize(64), head.codes.colour.resize(32);
+  head.code_factor.resize(64 * 65 / 2);
+  EXPECT_LT(head_file_bytes(head).size(), size_t(64) << 10);
 }
 
 TEST(HeadFiles, RoundWeightsToHalvesAndNothingElse) {
@@ -161,6 +183,7 @@ TEST(HeadFiles, RoundWeightsToHalvesAndNothingElse) {
 TEST(HeadFiles, WithoutCodesCamerasAnchorsAndPlacesAreRead) {
   StoredHead head = example();
   head.codes = {};
+  head.code_factor = {};
   head.cameras.clear();
   head.anchors = {};
   head.places.clear();
@@ -181,8 +204,11 @@ TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
   };
   refuse("weights is not finite", [](StoredHead& h) { h.weights.layer(1).bias[0] = NAN; });
   refuse("beyond 65504", [](StoredHead& h) { h.weights.layer(1).bias[0] = 70000; });
-  refuse("codes", [](StoredHead& h) { h.codes.shape.resize(513); });
+  refuse("512 codes", [](StoredHead& h) { h.codes.shape.resize(513); });
   refuse("codes", [](StoredHead& h) { h.codes.colour[0] = INFINITY; });
+  refuse("covariance of its codes", [](StoredHead& h) { h.code_factor.pop_back(); });
+  refuse("covariance of its codes", [](StoredHead& h) { h.code_factor[1] = NAN; });
+  refuse("covariance of its codes", [](StoredHead& h) { h.code_factor[1] = 1.5f; });
   refuse("257 cameras", [](StoredHead& h) { h.cameras.resize(257, h.cameras[0]); });
   refuse("0 x 480", [](StoredHead& h) { h.cameras[1].width_px = 0; });
   refuse("focal length of 0", [](StoredHead& h) { h.cameras[1].focal_px = 0; });
@@ -256,8 +282,9 @@ TEST(HeadFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
   refuse("ends before", kBad, [](auto& head) { head.cameras = 256; });
   refuse("ends before", kBad, [](auto& head) { head.anchors = 16384; });
   refuse("belong to nothing", kBad, [](auto& head) { head.places = 1; });
-  refuse("in a way", kBad, [](auto& head) { head.zero[1] = 1; });
+  refuse("in a way", kBad, [](auto& head) { head.zero = 1; });
   refuse("in a way", kBad, [](auto& head) { head.has_texture = 2; });
+  refuse("in a way", kBad, [](auto& head) { head.has_code_factor = 2; });
   refuse("ends before", kBad, [](auto& head) { head.has_texture = 1; });
   refuse("source 9", kBad, [](auto& head) { head.scale_source = 9; });
   refuse("scale is inf", kBad, [](auto& head) { head.metres_per_unit = INFINITY; });

@@ -129,6 +129,22 @@ TEST(TextureBake, WithoutPhotosAndOutsideTheMatteItIsTheMeshs) {
   }
 }
 
+TEST(TextureBake, WhatIsNotSeenLooksAsItDidBefore) {
+  TextureImage before;  // of half the size: 30 on one side, 200 on the other
+  before.side_px = kSide / 2;
+  for (int i = 0; i < before.side_px * before.side_px; ++i)
+    before.bgr.insert(before.bgr.end(), 3, i % before.side_px < before.side_px / 2 ? 30 : 200);
+  maq::WorkerThreads threads(1);
+  const HeadMesh mesh = ball();
+  const TextureOptions options{kSide, false, false};
+  const TextureImage same = bake_texture(mesh, {}, options, threads, before);
+  const Vec3 left = {0.8, -0.6, 0}, right = {-0.8, -0.6, 0};
+  EXPECT_EQ(at(same, left)[0] + at(same, right)[0], 230);
+  EXPECT_EQ(at(bake(mesh, {}), left)[0], kOwn);
+  const TextureImage seen = bake_texture(mesh, {photo_from({0.8, -0.6, 0}, {90, 90, 90})}, options, threads, before);
+  EXPECT_NEAR(at(seen, left)[0], 90, 2);
+}
+
 TEST(TextureBake, WhatLiesBehindAnotherPartTakesNothingOfIt) {
   // A small ball before the large one; the photo shows it in red.
   HeadMesh mesh = mesh_of([](float x, float y, float z) {

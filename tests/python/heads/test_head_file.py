@@ -10,7 +10,7 @@ from export.checked_file import CHECKED
 from export.heads.head_file import HEAD, HeadFileError, head_bytes, head_from_bytes, read_head, write_head
 from export.xxh3 import xxh3
 
-EXAMPLE = Path("tests/native/data/tiny_head/example.maqh")
+EXAMPLE, FIRST_EXAMPLE = (Path("tests/native/data/tiny_head") / f"example{of}.maqh" for of in ("", "_version_1"))
 
 
 def test_it_holds_what_the_sdk_wrote():
@@ -41,12 +41,19 @@ def test_it_holds_what_the_sdk_wrote():
     np.testing.assert_array_equal(head.anchor_sigma, [0.015625] * 5)
     assert list(head.places) == ["nose_tip", "chin"]
     assert bytes.fromhex(head.prior_sha256)[:3] == bytes([0, 7, 14])
+    np.testing.assert_array_equal(head.code_factor, [0.5, -0.125, 0.75, 0.25, 0.0625, 1])
 
 
 def test_what_is_read_is_written_again_byte_by_byte(tmp_path):
     write_head(read_head(EXAMPLE), tmp_path / "again.maqh")
     assert (tmp_path / "again.maqh").read_bytes() == EXAMPLE.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["again.maqh"]
+
+
+def test_version_1_is_read_and_does_not_say_how_sure_codes_are():
+    first, head = read_head(FIRST_EXAMPLE), read_head(EXAMPLE)
+    assert first.code_factor is None
+    assert head_bytes(replace(first, code_factor=head.code_factor)) == EXAMPLE.read_bytes()
 
 
 def test_a_texture_is_read_and_written():
@@ -82,6 +89,8 @@ def test_every_byte_that_is_missing_or_changed_is_noticed():
         ("cameras", 256, "ends before"),
         ("places", 1, "belong to nothing"),
         ("scale_source", 3, "in a way"),
+        ("has_code_factor", 2, "in a way"),
+        ("zero", 1, "in a way"),
     ],
 )
 def test_heads_that_lie_are_refused_though_their_check_is_right(key, value, text):

@@ -164,6 +164,17 @@ def test_two_photos_make_one_head_with_two_cameras(builder):
         head.camera(2)
 
 
+def test_photos_are_added_to_a_head_from_a_file(builder, head, tmp_path):
+    head.save(tmp_path / "a.maqh")
+    builder.add_head(maquette.Head.open(tmp_path / "a.maqh"))
+    builder.add_photo(GREY, BOX)
+    both = builder.fit(0)
+
+    assert (both.info.photo_count, builder.stats["photo_count"]) == (2, 1)
+    assert both.camera(0).centre == pytest.approx(head.camera(0).centre)  # that of its photo, as it was
+    assert both.landmark("nose_tip").sigma_m < head.landmark("nose_tip").sigma_m
+
+
 def test_a_photo_without_the_head_is_left_out_and_has_no_camera(builder):
     blue = np.full_like(GREY, (20, 60, 200))  # in blue the bundle sees a mirrored head, which no camera explains
     builder.add_photo(blue, BOX)

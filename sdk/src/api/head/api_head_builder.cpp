@@ -93,6 +93,14 @@ maq_status maq_head_builder_add_photo(maq_head_builder* builder, const maq_frame
   });
 }
 
+maq_status maq_head_builder_add_head(maq_head_builder* builder, const maq_head* head) {
+  return guarded_alone(builder, "builder", __func__, [&] {
+    require_argument(head, "head");
+    builder->builder->add_head(head->head);
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_head_builder_clear(maq_head_builder* builder) {
   return guarded_alone(builder, "builder", __func__, [&] {
     builder->builder->clear();

@@ -155,7 +155,13 @@ void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
   stats_.encode_ms += watch.elapsed_ms();
 }
 
+void HeadBuilder::add_head(StoredHead head) {
+  EarlierHead made(bundle_.prior, bundle_.prior_sha256, std::move(head));
+  earlier_.emplace(std::move(made));
+}
+
 void HeadBuilder::clear() {
+  earlier_.reset();
   photos_.clear();
   found_.clear();
   crops_.clear();
@@ -267,10 +273,14 @@ void HeadBuilder::set_preview(double interval_s, Preview preview) {
   preview_ = std::move(preview);
 }
 
-StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weights, const AnchorFit& start,
+StoredHead HeadBuilder::stored_head(const FieldCodes& fitted, FieldWeights weights, const AnchorFit& start,
                                     const std::vector<PhotoFit>& photos) const {
   const HeadPrior& prior = bundle_.prior;
   StoredHead head(std::move(weights));
+  head.codes = earlier_ ? earlier_->codes(fitted) : fitted;
+  const std::vector<float> covariance = earlier_ ? earlier_->covariance(start.code_covariance) : start.code_covariance;
+  head.code_factor = covariance_factor(covariance, head.codes.shape.size());
+  if (earlier_) head.cameras = earlier_->head().cameras;
   for (const PhotoFit& photo : photos) {
     if (photo.is_used()) head.cameras.push_back(photo.camera);
   }
@@ -278,10 +288,10 @@ StoredHead HeadBuilder::stored_head(const FieldCodes& codes, FieldWeights weight
   head.sharpness = prior.sharpness;
   head.cut = prior.cut;
   head.bounds = prior.bounds;
-  head.anchors = known_anchors(prior, codes.shape, start.code_covariance);
+  head.anchors = known_anchors(prior, head.codes.shape, covariance);
+  if (earlier_) head.scale = earlier_->scale(head.scale, head.anchors);
   head.places = prior.places;
   head.prior_sha256 = bundle_.prior_sha256;
-  head.codes = codes;
   return head;
 }
 
@@ -291,7 +301,7 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
     cancel_.check();
   };
   report(0);
-  const HeadPrior& prior = bundle_.prior;
+  const HeadPrior& prior = earlier_ ? earlier_->prior() : bundle_.prior;
   HeadFitOptions options;
   options.seconds = seconds;
   WorkerThreads threads(encoder_.threads());
@@ -325,7 +335,8 @@ StoredHead HeadBuilder::fit_photos(double seconds, const Progress& progress) {
     for (size_t i = 0; i < photos_.size(); ++i) {
       if (fit.photos[i].is_used()) sources.push_back({&crops_[i], &photos_[i].seen, fit.photos[i].camera});
     }
-    head.texture = make_texture(head, sources, texture_, threads);
+    head.texture =
+        make_texture(head, sources, texture_, threads, earlier_ ? earlier_->head().texture : StoredTexture{});
   }
   report(1);
   return head;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "head/build/earlier_head.h"
 #include "head/build/head_texture.h"
 #include "head/bundle/head_bundle.h"
 #include "head/bundle/head_encoder.h"
@@ -53,6 +54,10 @@ class HeadBuilder {
   // On failure nothing changes. Throws MAQ_ERROR_INVALID_ARGUMENT for hints that no photo of that size can have, and
   // for more than kMaxFitPhotos; MAQ_ERROR_NOT_FOUND where no head is seen; what HeadEncoder::run() throws.
   void add_photo(const ImageView& photo, const PhotoHints& hints);
+  // A head of the same person, to whose photos those of this builder are added; it replaces an earlier one. On failure
+  // nothing changes. Throws what EarlierHead throws.
+  void add_head(StoredHead head);
+  // Forgets the photos, and the head that they would be added to.
   void clear();
   size_t photo_count() const { return photos_.size(); }
   const PhotoFound& found(size_t index) const { return found_[index]; }
@@ -90,13 +95,14 @@ class HeadBuilder {
   // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
   std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);
-  StoredHead stored_head(const FieldCodes& codes, FieldWeights weights, const AnchorFit& start,
+  StoredHead stored_head(const FieldCodes& fitted, FieldWeights weights, const AnchorFit& start,
                          const std::vector<PhotoFit>& photos) const;
 
   HeadBundle bundle_;
   HeadEncoder encoder_;
   RunCancel cancel_;
   HeadEncoding encoding_;
+  std::optional<EarlierHead> earlier_;
   std::vector<HeadPhoto> photos_;
   std::vector<PhotoFound> found_;
   TextureOptions texture_;

@@ -6,6 +6,7 @@
 #include "head/build/head_surface.h"
 #include "head/mesh/mesh_cleanup.h"
 #include "head/texture/texture_layout.h"
+#include "image/files/image_file.h"
 #include "image/files/jpeg.h"
 
 namespace maq::head {
@@ -47,7 +48,7 @@ void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh) {
 }
 
 StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
-                           const TextureOptions& options, WorkerThreads& threads) {
+                           const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier) {
   HeadMesh mesh = head_surface(head, {kBakedCell_m}, threads);
   set_texture_coordinates(head, mesh);
   const double scale = 10 * head.scale.metres_per_unit;
@@ -61,7 +62,20 @@ StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSour
     for (const HeadCell& cell : source.seen->cells) photo.matte.push_back(float(cell.matte));
     given.push_back(std::move(photo));
   }
-  const TextureImage image = bake_texture(mesh, given, options, threads);
+  TextureImage before;
+  if (!earlier.jpeg.empty()) {
+    Frame decoded;
+    decode_image(earlier.jpeg, "The head's texture", decoded);
+    const ImageView& picture = decoded.image;
+    if (picture.format == MAQ_PIXEL_BGR8 && picture.width_px == picture.height_px) {
+      before.side_px = picture.width_px;
+      for (int row = 0; row < picture.height_px; ++row) {
+        const uint8_t* const from = picture.planes[0].data + size_t(row) * picture.planes[0].stride_bytes;
+        before.bgr.insert(before.bgr.end(), from, from + 3 * size_t(picture.width_px));
+      }
+    }
+  }
+  const TextureImage image = bake_texture(mesh, given, options, threads, before);
   ImageView view;
   view.format = MAQ_PIXEL_BGR8;
   view.width_px = view.height_px = image.side_px;

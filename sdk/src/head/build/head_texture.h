@@ -29,9 +29,10 @@ struct TextureSource {
   HeadCamera camera;
 };
 
-// As a JPEG file. Throws what head_surface() and JpegEncoder throw.
+// As a JPEG file. `earlier`: of the same head before these photos, in place of the network's colours; empty: there is
+// none. Throws what head_surface(), decode_image() and JpegEncoder throw.
 StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
-                           const TextureOptions& options, WorkerThreads& threads);
+                           const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier = {});
 
 // Gives a mesh of the head (head_surface) its places in the texture.
 void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh);

@@ -81,6 +81,25 @@ void WeightBases::add_codes(const Bases& bases, const std::vector<float>& codes,
                     bases.count, weights.values().data() + bases.begin);
 }
 
+WeightBases WeightBases::moved(const FieldCodes& mean, const std::vector<float>& factor) const {
+  WeightBases made = *this;
+  combine(mean, made.constant_);
+  const auto codes = size_t(geometry_.codes);
+  if (factor.size() != codes * (codes + 1) / 2) {
+    throw Error(MAQ_ERROR_INTERNAL, "The factor of ", codes, " shape codes has ", factor.size(), " numbers.");
+  }
+  std::fill(made.geometry_.values.begin(), made.geometry_.values.end(), 0.0f);
+  const float* weight = factor.data();
+  for (size_t row = 0; row < codes; ++row) {
+    const float* const from = geometry_.values.data() + row * geometry_.count;
+    for (size_t column = 0; column <= row; ++column, ++weight) {
+      float* const to = made.geometry_.values.data() + column * geometry_.count;
+      for (size_t i = 0; i < geometry_.count; ++i) to[i] += *weight * from[i];
+    }
+  }
+  return made;
+}
+
 void WeightBases::code_gradient(const FieldWeights& weight_gradient, FieldCodes& codes) const {
   if (weight_gradient.shape() != shape()) {
     throw Error(MAQ_ERROR_INTERNAL, "A gradient and bases are of two shapes of field.");

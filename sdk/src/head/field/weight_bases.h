@@ -40,6 +40,10 @@ class WeightBases {
   void combine(const FieldCodes& codes, FieldWeights& weights) const;
   FieldWeights combine(const FieldCodes& codes) const;
 
+  // Bases of the same heads by other codes u: shape codes are mean + L u, colour codes mean + u. `factor`: L, lower
+  // triangle, row by row. Throws as combine() does, and MAQ_ERROR_INTERNAL for a factor of another size.
+  WeightBases moved(const FieldCodes& mean, const std::vector<float>& factor) const;
+
   // By the gradient of a loss by the weights, that by the codes.
   void code_gradient(const FieldWeights& weight_gradient, FieldCodes& codes) const;
 

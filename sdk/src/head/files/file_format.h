@@ -9,7 +9,7 @@
 
 namespace maq::head {
 
-inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 1, kTemplateFileVersion = 1;
+inline constexpr uint32_t kPriorFileVersion = 1, kHeadFileVersion = 2, kTemplateFileVersion = 1;
 inline constexpr char kPriorFileMagic[8] = {'M', 'A', 'Q', 'P', 'R', 'I', '\r', '\n'};
 inline constexpr char kHeadFileMagic[8] = {'M', 'A', 'Q', 'H', 'E', 'D', '\r', '\n'};
 inline constexpr char kTemplateFileMagic[8] = {'M', 'A', 'Q', 'T', 'E', 'M', '\r', '\n'};
@@ -46,7 +46,7 @@ struct PriorFileHead {
 static_assert(sizeof(PriorFileHead) == 144 && offsetof(PriorFileHead, sharpness) == 88);
 
 // weights: of each layer, float16: weights [outputs][inputs] and bias [outputs].
-// codes: float32 shape codes, colour codes.
+// codes: float32 shape codes, colour codes; where has_code_factor is 1, float16 [K (K + 1) / 2] of K shape codes.
 // cameras: StoredCamera.
 // anchors: float16 template points [anchors][3], points [anchors][3], sigma [anchors].
 // places: as of a prior.
@@ -56,7 +56,7 @@ struct HeadFileHead {
   StoredShape shape;
   uint32_t shape_codes, colour_codes, cameras, anchors, places;
   float sharpness;
-  uint8_t scale_source, has_texture, zero[2];
+  uint8_t scale_source, has_texture, has_code_factor, zero;  // has_code_factor: 0 in files of version 1
   double metres_per_unit, metres_sigma, cut_point[3], cut_normal[3];
   float bounds_min[3], bounds_max[3];
   uint8_t prior_sha256[32];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/files/atomic_file.h"
 #include "core/files/file.h"
@@ -15,6 +16,15 @@ constexpr char kHeadKind[] = "a head (.maqh)";
 constexpr char kHeadRemedy[] = "Fit the head again, or use the Maquette that it was made with.";
 constexpr StoredFormat kStoredHalf = StoredFormat::kFloat16, kStoredFloat = StoredFormat::kFloat32;
 constexpr float kMaxHalf = 65504;
+constexpr uint32_t kFirstHeadFileVersion = 1;  // it is read, too
+
+// Of files that begin as one of that version does; else the one that is written.
+uint32_t version_to_read(const void* bytes, size_t count) {
+  FileStart start;
+  if (count < sizeof start) return kHeadFileVersion;
+  std::memcpy(&start, bytes, sizeof start);
+  return start.version == kFirstHeadFileVersion ? kFirstHeadFileVersion : kHeadFileVersion;
+}
 
 Vec3 vector_of(const double (&values)[3]) { return {values[0], values[1], values[2]}; }
 
@@ -50,8 +60,9 @@ void check_counts(const HeadFileHead& head, const FieldShape& shape, const Store
     file.fail(" claims ", head.shape_codes, " and ", head.colour_codes, " codes, ", head.cameras, " cameras, ",
               head.anchors, " anchors and ", head.places, " places: more than a head may have.");
   }
-  if (head.zero[0] + head.zero[1] > 0 || head.has_texture > 1) {
-    file.fail(" stores its numbers in a way that version ", kHeadFileVersion, " does not have.");
+  const uint32_t version = head.start.version;
+  if (head.zero > 0 || head.has_texture > 1 || head.has_code_factor > version - kFirstHeadFileVersion) {
+    file.fail(" stores its numbers in a way that version ", version, " does not have.");
   }
   uint64_t weights = 0;
   for (int layer = 0; layer < shape.layers(); ++layer) weights += stored_layer_bytes(shape, layer, kStoredHalf, 1);
@@ -81,6 +92,7 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
   file_head.sharpness = head.sharpness;
   file_head.scale_source = uint8_t(head.scale.source);
   file_head.has_texture = head.texture.side_px > 0 ? 1 : 0;
+  file_head.has_code_factor = head.code_factor.empty() ? 0 : 1;
   file_head.metres_per_unit = head.scale.metres_per_unit;
   file_head.metres_sigma = head.scale.sigma;
   put(head.cut.point, file_head.cut_point);
@@ -95,6 +107,7 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
     writer.layer(kStoredHalf, head.weights.layer(layer));
   for (const auto* codes : {&head.codes.shape, &head.codes.colour})
     writer.floats(kStoredFloat, codes->data(), codes->size());
+  writer.floats(kStoredHalf, head.code_factor.data(), head.code_factor.size());
   for (const HeadCamera& camera : head.cameras) writer.number(stored(camera));
   for (const auto* values : {&head.anchors.template_points, &head.anchors.points, &head.anchors.sigma}) {
     writer.floats(kStoredHalf, values->data(), values->size());
@@ -125,7 +138,7 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
     throw Error(MAQ_ERROR_UNSUPPORTED, name, " has ", count, " bytes; a head has at most ", kMaxHeadFileBytes, ".");
   }
   StoredBytes file(bytes, count, name, MAQ_ERROR_UNREADABLE);
-  const auto file_head = file.head<HeadFileHead>(kHeadFileMagic, kHeadFileVersion, kHeadKind, kHeadRemedy);
+  const auto file_head = file.head<HeadFileHead>(kHeadFileMagic, version_to_read(bytes, count), kHeadKind, kHeadRemedy);
   const FieldShape shape = checked_shape(file_head.shape, file);
   check_counts(file_head, shape, file);
 
@@ -133,6 +146,10 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
   for (int layer = 0; layer < shape.layers(); ++layer) file.layers(kStoredHalf, {head.weights.layer(layer)});
   head.codes.shape = file.floats(kStoredFloat, file_head.shape_codes);
   head.codes.colour = file.floats(kStoredFloat, file_head.colour_codes);
+  if (file_head.has_code_factor != 0) {
+    const size_t codes = file_head.shape_codes;
+    head.code_factor = file.floats(kStoredHalf, codes * (codes + 1) / 2);
+  }
   for (uint32_t i = 0; i < file_head.cameras; ++i) head.cameras.push_back(camera_of(file.number<StoredCamera>()));
   head.anchors.template_points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));
   head.anchors.points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));

@@ -23,7 +23,8 @@ void write_head_file(const StoredHead& head, const std::string& path);
 // `bytes` may be null where `count` is 0, and are not needed afterwards. `name` begins the sentence of errors. Whatever
 // the bytes, also those of a hostile file with a right checksum: what comes back has no fault, and takes at most some
 // eight times the file's memory. Throws MAQ_ERROR_UNREADABLE for what is not a head, truncated or damaged;
-// MAQ_ERROR_UNSUPPORTED for another version, a field that the engine does not take, or more than kMaxHeadFileBytes.
+// MAQ_ERROR_UNSUPPORTED for another version than 1 and 2, a field that the engine does not take, or more than
+// kMaxHeadFileBytes.
 StoredHead read_head(const void* bytes, size_t count, const std::string& name);
 
 // Throws what read_file() throws besides.

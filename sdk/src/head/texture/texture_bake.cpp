@@ -126,6 +126,17 @@ std::array<double, kChannels> between_pixels(const std::vector<T>& values, int w
   return made;
 }
 
+// In place of the mesh's colours those of a texture, whatever its size.
+void take_colours(const TextureImage& from, int side, Texels& texels) {
+  const double scale = double(from.side_px) / double(side);
+  for (size_t i = 0; i < texels.is_surface.size(); ++i) {
+    if (texels.is_surface[i] == 0) continue;
+    const double x = (double(i % size_t(side)) + 0.5) * scale - 0.5, y = (double(i / size_t(side)) + 0.5) * scale - 0.5;
+    const auto bgr = between_pixels<uint8_t, 3>(from.bgr, from.side_px, from.side_px, x, y);
+    for (size_t c = 0; c < 3; ++c) texels.colours[3 * i + c] = float(bgr[2 - c]);
+  }
+}
+
 // How much of 5 x 5 pixels around a place show a surface at this depth, or one behind it: 0 at what hides it and just
 // beside that, as a fitted edge is not quite where the photo's is.
 double seen_fraction(const RasterImage& depths, double x, double y, double depth, int spacing_px) {
@@ -281,13 +292,14 @@ HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int s
 }
 
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
-                          WorkerThreads& threads) {
+                          WorkerThreads& threads, const TextureImage& earlier) {
   const int side = options.side_px;
   if (side < kMinTexture_px || side > kMaxTexture_px) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The texture has ", side, " pixels a side, but must have ", kMinTexture_px,
                 " to ", kMaxTexture_px, ".");
   }
   Texels texels = draw_texels(mesh, side, threads);
+  if (earlier.side_px > 0) take_colours(earlier, side, texels);
   Differences seen = blend(photos, mesh, texels, side, threads);
   const PhotoLight light = match_light(texels, seen);
   const std::array<double, 3> even = mean_strength(light, texels, seen.weights);

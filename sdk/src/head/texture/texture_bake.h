@@ -42,8 +42,9 @@ struct TextureImage {
 // says that it is the head; finer photos more. What a photo differs from the mesh's colours by is blended; its mean
 // over the photo is made the same for all photos. What no photo sees has the mesh's colours in the photos' light
 // (photo_light.h), and what its surroundings still differ by, less with the distance: so there is no step. The same for
-// any number of threads.
+// any number of threads. `earlier`: what the head looked like before these photos, of any size; its colours take the
+// place of the mesh's. Of 0 pixels: there is none.
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
-                          WorkerThreads& threads);
+                          WorkerThreads& threads, const TextureImage& earlier = {});
 
 }  // namespace maq::head

@@ -30,6 +30,7 @@ using BoxPx = std::array<float, 4>;
 
 struct HeadOptions {
   std::vector<std::string> photos;
+  std::string add;  // a head that the photos are added to; empty: a new one
   std::string out, save, preview;
   double seconds = 3;
   std::string person = "1";
@@ -264,6 +265,7 @@ maquette::Head sized(const HeadOptions& options, const maquette::Context& contex
 void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
              const Task& task, maquette::HeadBuilder& builder, Stages stages) {
   builder.clear();
+  if (!options.add.empty()) builder.add_head(maquette::Head::open(context, options.add));
   LapTimer timer;
   add_photos(options, photos, task, builder);
   stages.look_ms = timer.lap_ms();
@@ -311,6 +313,9 @@ void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
   }
   if (!options.save.empty() && options.save == options.out) {
     throw std::runtime_error("--out and --save are the same file; give each a name of its own.");
+  }
+  if (!options.add.empty() && options.person == "all") {
+    throw std::runtime_error("--add is one person's head; name the person, not --person all.");
   }
 }
 
@@ -382,7 +387,9 @@ void add_head_command(CLI::App& app, int* exit_code) {
       command->add_option("photo", options->photos, "Photos of one person: photo.jpg, 'image:photo.jpg?fov=60'");
   command->add_option("-o,--out", options->out, "Mesh to write: .glb (for most programs), .obj or .ply")
       ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
-  command->add_option("--save", options->save, "Also keep the head itself, some 60 KB: head.maqh");
+  command->add_option("--add", options->add,
+                      "Add the photos to this head, head.maqh, whose own photos are not needed: one person");
+  command->add_option("--save", options->save, "Also keep the head itself, some 64 KB: head.maqh");
   command
       ->add_option("--preview", options->preview, "Also a clip of the head turning, turn.mp4; or a picture, front.png")
       ->check(CLI::Validator(check_head_view_name, ".mp4, .avi, .png or .jpg"));
@@ -458,6 +465,7 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "Examples:\n"
       "  maquette head photo.jpg --out head.glb\n"
       "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
+      "  maquette head right.jpg --add head.maqh --out head.glb --save head.maqh\n"
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
       "  maquette head photo.jpg --out head.glb --pupils 63\n"

@@ -93,6 +93,10 @@ MAQ_NATIVE_OF(NativeHead, void, addPhoto)(JNIEnv* env, jclass, jlong builder, jl
   });
 }
 
+MAQ_NATIVE_OF(NativeHead, void, addHead)(JNIEnv* env, jclass, jlong builder, jlong head) {
+  call(env, [&] { check(maq_head_builder_add_head(object<maq_head_builder>(builder), object<maq_head>(head))); });
+}
+
 MAQ_NATIVE_OF(NativeHead, void, clear)(JNIEnv* env, jclass, jlong builder) {
   call(env, [&] { check(maq_head_builder_clear(object<maq_head_builder>(builder))); });
 }

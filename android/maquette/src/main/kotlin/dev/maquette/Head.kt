@@ -8,7 +8,7 @@ import dev.maquette.jni.NativeHead
  * a texture has the face's pixels. All functions may be called from any thread.
  */
 class Head internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeHead::destroy)
+    internal val handle = Handle(this, pointer, NativeHead::destroy)
 
     /** Where the size of a head is from. */
     enum class Scale {
@@ -122,7 +122,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
         }
 
     /**
-     * Writes the head to a file (.maqh), some 60 KB and the texture, atomically, in a folder that exists. Blocks until it is
+     * Writes the head to a file (.maqh), some 64 KB and the texture, atomically, in a folder that exists. Blocks until it is
      * on the disk.
      *
      * @throws MaquetteException with [Status.UNWRITABLE].

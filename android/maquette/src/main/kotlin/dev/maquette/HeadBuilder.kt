@@ -161,7 +161,17 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         handle.use { builder -> photo.handle.use { NativeHead.addPhoto(builder, it, hints) } }
     }
 
-    /** Forgets the photos, for a head of another person. */
+    /**
+     * Adds the photos of this builder to those that [head] was fitted to, which are not needed: later fits go on from what
+     * they said. It must be of the same person; another takes its place. Its cameras come first in the head that is
+     * fitted, and a size that was known stays.
+     *
+     * @throws MaquetteException with [Status.UNSUPPORTED] (a head of another bundle, or from a file of
+     *   version 1), [Status.INVALID_ARGUMENT] (more than 192 photos).
+     */
+    fun addHead(head: Head) = handle.use { builder -> head.handle.use { NativeHead.addHead(builder, it) } }
+
+    /** Forgets the photos, and the head that they would be added to, for a head of another person. */
     fun clear() = handle.use(NativeHead::clear)
 
     /**

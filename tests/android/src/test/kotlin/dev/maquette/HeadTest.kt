@@ -53,6 +53,15 @@ class HeadTest : AndroidTest() {
     private fun length(p: Point3) = sqrt(p.x * p.x + p.y * p.y + p.z * p.z)
 
     @Test
+    fun photosAreAddedToAHead() =
+        maquette.headBuilder(bundle).use { builder ->
+            head().use { builder.addHead(it) }
+            photo().use { builder.addPhoto(it, box) }
+            builder.fit(0.0).use { assertEquals(2, it.info.photos) }
+            assertEquals(1, builder.photos.size)
+        }
+
+    @Test
     fun aPhotoBecomesAHeadWithAMeshAndPlaces() =
         withBuilder<Unit> { builder ->
             val done = mutableListOf<Double>()

@@ -22,6 +22,9 @@ internal object NativeHead {
 
     /** [hints]: left, top, right and bottom of the box, roll, focal length; 0 where they are not known. */
     @JvmStatic external fun addPhoto(builder: Long, photo: Long, hints: FloatArray)
+
+    @JvmStatic external fun addHead(builder: Long, head: Long)
+
     @JvmStatic external fun clear(builder: Long)
     @JvmStatic external fun cancel(builder: Long)
 

@@ -1,0 +1,39 @@
+// What a head that was fitted before says of photos that are added later: it takes the place of the prior.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "head/head_prior.h"
+#include "head/stored_head.h"
+
+namespace maq::head {
+
+// Lower triangle L of L L^T = `covariance` [codes][codes], row by row; empty where it is not positive.
+std::vector<float> covariance_factor(const std::vector<float>& covariance, size_t codes);
+
+// The heads of `prior` by codes u that are normal a priori as long as the earlier head's photos are all that is known:
+// shape codes z + L u, with the head's own z and what its photos left of them; colour codes z + u, as a photo in other
+// light may change them. So a fit with `prior` counts each earlier photo's cells, but not its pixels again.
+class EarlierHead {
+ public:
+  // `prior_sha256`: of the prior's file. Throws MAQ_ERROR_UNSUPPORTED for a head that was fitted with another prior or
+  // whose file does not say how sure its codes are; MAQ_ERROR_INVALID_ARGUMENT for codes that no head has, and where
+  // it has so many cameras that kMaxFitPhotos more are too many.
+  EarlierHead(const HeadPrior& prior, const std::array<uint8_t, 32>& prior_sha256, StoredHead head);
+
+  const HeadPrior& prior() const { return prior_; }
+  const StoredHead& head() const { return head_; }
+
+  // Of the bundle's prior, from those of prior().
+  FieldCodes codes(const FieldCodes& moved) const;
+  std::vector<float> covariance(const std::vector<float>& moved) const;
+  // Of a head with these anchors: one of known size stays as large as it was.
+  HeadScale scale(const HeadScale& by_prior, const StoredAnchors& anchors) const;
+
+ private:
+  StoredHead head_;
+  HeadPrior prior_;
+};
+
+}  // namespace maq::head

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import igl
@@ -42,7 +43,15 @@ def mesh_of(prior: Prior, cell_dm: float = CELL_DM) -> Triangles:
         field = torch.cat([geometry(prior.shape, weights, part)[:, 0] for part in parts]).numpy()
         return np.maximum(field, (points - prior.cut_point) @ prior.cut_normal)
 
-    low, high = prior.bounds_min.astype(np.float64), prior.bounds_max.astype(np.float64)
+    return mesh_of_distances(
+        distances, prior.bounds_min.astype(np.float64), prior.bounds_max.astype(np.float64), cell_dm
+    )
+
+
+def mesh_of_distances(
+    distances: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, cell_dm: float = CELL_DM
+) -> Triangles:
+    """Largest piece of the surface within the box low [3], high [3], dm; in mm. distances: of points [N, 3], dm."""
     coarse = np.ceil((high - low) / (COARSE * cell_dm)).astype(int) + 1
     fine = COARSE * (coarse - 1) + 1
     axes = [a + cell_dm * np.arange(n) for a, n in zip(low, fine, strict=True)]

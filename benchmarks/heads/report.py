@@ -41,7 +41,7 @@ before grey; of the fitted head with a texture of 512 x 512, and *without textur
 head has the photo projected onto it by the true camera, and where the photo does not see it the colour of the nearest
 place that it does. *By features*: how far features of the person detector's trunk differ, relative to their size,
 averaged over four layers (lower is better); in the manner of LPIPS, without anybody's judgement in it. NeuS from a
-sphere is not among them: the library has no such fit, as its prior is part of the network."""
+sphere is not among them: it takes minutes, and is a command of its own (`python -m benchmarks.heads.alone.neus`)."""
 
 _REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
 mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted

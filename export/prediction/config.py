@@ -22,9 +22,9 @@ class AutoencoderShape:
 
 @dataclass(frozen=True)
 class TransformerShape:
-    """layers: of the context network and of the slice network, each; embedding: channels of embedded codes; frames:
-    how many before the predicted one are seen; motion: whether the codes of the picture that motion alone predicts are
-    seen as well; slices, entries: of the autoencoder."""
+    """layers: of the context network; slice_layers: of the slice network, where they are not as many; embedding:
+    channels of embedded codes; frames: how many before the predicted one are seen; motion: whether the codes of the
+    picture that motion alone predicts are seen as well; slices, entries: of the autoencoder."""
 
     width: int = 192
     layers: int = 6
@@ -36,6 +36,11 @@ class TransformerShape:
     slices: int = 4
     entries: int = 512
     motion: bool = False
+    slice_layers: int | None = None
+
+    @property
+    def layers_of_slices(self) -> int:
+        return self.layers if self.slice_layers is None else self.slice_layers
 
     @property
     def seen(self) -> int:

@@ -71,12 +71,13 @@ class Training:
         return {"shape": asdict(self.net.shape), "net": {k: v.cpu() for k, v in self.net.state_dict().items()}}
 
 
-def add_arguments(parser: argparse.ArgumentParser, minutes: float, batch: int, rate: float) -> None:
+def add_arguments(parser: argparse.ArgumentParser, minutes: float, batch: int, rate: float, warm_up: int = 200) -> None:
     """What all trainings ask for, with these defaults."""
     parser.add_argument("--minutes", type=float, default=minutes, help="of the whole schedule, over resumes")
     parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
     parser.add_argument("--batch", type=int, default=batch, help="frames a step (default %(default)s)")
     parser.add_argument("--rate", type=float, default=rate, help="of learning (default %(default)s)")
+    parser.add_argument("--warm-up", type=int, default=warm_up, help="steps until then (default %(default)s)")
     parser.add_argument("--bf16", action="store_true", help="on GPUs, and processors that have it (AVX-512 BF16)")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu", help="default %(default)s")
     parser.add_argument("--seed", type=int, default=0)
@@ -123,7 +124,8 @@ def run(
 
     while not schedule.finished(training.step, training.spent_s) and not stop:
         seed_step(arguments.seed, training.step)
-        terms = advance(rate_at(training.step, schedule.fraction(training.step, training.spent_s), arguments.rate))
+        fraction = schedule.fraction(training.step, training.spent_s)
+        terms = advance(rate_at(training.step, fraction, arguments.rate, arguments.warm_up))
         if training.step % _SHOW_EVERY == 0:  # reading a GPU's numbers waits for it
             smoothed.update(terms)
             training.log.append({"step": training.step, "loss": smoothed.loss, "terms": dict(smoothed.values)})

@@ -77,7 +77,7 @@ class SliceNetwork(nn.Module):
         self.left = nn.Conv2d(shape.embedding, shape.width, 1, bias=False)
         self.from_context = nn.Linear(shape.width, shape.width)
         self.register_buffer("positions", sinusoids(shape.width), persistent=False)
-        self.layers = nn.Sequential(*(AttentionLayer(shape, masked=True) for _ in range(shape.layers)))
+        self.layers = nn.Sequential(*(AttentionLayer(shape, masked=True) for _ in range(shape.layers_of_slices)))
 
     def forward(self, context: Tensor, codes: Tensor) -> Tensor:
         """context [B, 256, width]; codes int64 [B, slices, 16, 16] -> [B, 256, width]."""

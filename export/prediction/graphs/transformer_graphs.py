@@ -123,14 +123,14 @@ def write_transformer_graphs(net: LatentTransformer, folder: Path) -> None:
     kept_shape = (samples, shape.heads, kept, shape.head_width)
     caches = [
         torch.zeros(size)
-        for _ in range(shape.layers)
+        for _ in range(shape.layers_of_slices)
         for size in (kept_shape, kept_shape, (shape.heads, rows, kept + rows))
     ]
     near = torch.zeros(samples, rows, len(NEIGHBOURS) * shape.embedding)
     given = [torch.zeros(samples, rows, shape.width), near, *caches]
-    inputs, outputs = slice_names(shape.layers)
+    inputs, outputs = slice_names(shape.layers_of_slices)
     axes: dict[str, dict[int, str]] = {name: {0: "samples", 1: "rows"} for name in ("context", "near", "features")}
-    for k in range(shape.layers):
+    for k in range(shape.layers_of_slices):
         axes |= {f"{name}_{k}": {0: "samples", 2: "kept"} for name in ("keys", "values")}
         axes |= {f"new_{name}_{k}": {0: "samples", 2: "rows"} for name in ("keys", "values")}
         axes[f"bias_{k}"] = {1: "rows", 2: "kept_and_rows"}

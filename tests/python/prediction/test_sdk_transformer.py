@@ -25,7 +25,9 @@ from export.prediction.transformer import UNSEEN, LatentTransformer
 
 WEIGHTS = Path("export/weights/prediction-autoencoder.pt")
 FPS = 15.0
-SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=16, motion=True)
+SHAPE = TransformerShape(
+    width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=16, motion=True, slice_layers=1
+)
 
 
 @pytest.fixture(scope="module")

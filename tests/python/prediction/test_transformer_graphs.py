@@ -14,7 +14,9 @@ from export.prediction.graphs.transformer_file import TransformerTables
 from export.prediction.sampling import drawn_codes
 from export.prediction.transformer import UNSEEN, LatentTransformer
 
-SHAPE = TransformerShape(width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=8, slices=3, entries=16)
+SHAPE = TransformerShape(
+    width=32, layers=2, heads=2, head_width=8, hidden=16, embedding=8, slices=3, entries=16, slice_layers=1
+)
 FPS = 15.0
 
 

@@ -1,5 +1,5 @@
-"""What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, and how long a
-concealer's frames are waited for; how long surprise takes.
+"""What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, how long a
+concealer's frames are waited for and how near the truth they are; how long surprise takes.
 
     python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (5 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
@@ -27,16 +27,17 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from benchmarks import gaps
+from benchmarks.gaps import FIRST_START, START_STEP, psnr_db
 from export.clips.clip import read_clip
 
 PROGRAM = Path("build/release/benchmarks/native/measure_prediction")
 HORIZONS = (1, 3, 5, 8)  # frames ahead
 BUNDLE = Path("sdk/models/prediction-int8")
 SIZE_PX, LARGE_PX = (320, 240), (640, 480)
-FIRST_START, START_STEP = 4, 3  # as measure_prediction has them
 FRAMES = 90  # of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
-FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second")
+FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second", *gaps.FIGURES)
 METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
 
 
@@ -84,6 +85,12 @@ def measure(
         figures["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
     else:
         missing["prediction_pictures_a_second"] = "; ".join(absent)
+    bridged = gaps.measure(films, threads)
+    document["gaps"] = {name: rows.tolist() for name, rows in bridged.items()}
+    if bridged:
+        figures |= gaps.figures_of(bridged)
+    else:
+        missing |= dict.fromkeys(gaps.FIGURES, "; ".join(absent))
     return document, figures, missing
 
 
@@ -159,11 +166,6 @@ def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
     return {horizon: float(np.mean(values)) for horizon, values in errors.items()}, float(np.median(times))
 
 
-def psnr_db(one: np.ndarray, other: np.ndarray) -> float:
-    squares = np.mean((one.astype(np.float32) - other) ** 2)
-    return float(10 * np.log10(255**2 / max(squares, 0.01)))
-
-
 def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
     """Surprise of a simulated camera of 640 x 480: by median wall-clock time, processor time, medians of stages."""
     surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
@@ -235,6 +237,11 @@ def section(measured: dict) -> tuple[str, list]:
         f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
         f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
     )
+    if measured["gaps"]:
+        parts.append(
+            "Gaps of up to 300 ms bridged, PSNR in dB over their frames: the last frame repeated / what is predicted."
+        )
+        parts.append(gaps.table_of({name: np.array(rows) for name, rows in measured["gaps"].items()}))
     surprise = measured["surprise"]
     parts.append(
         f"Surprise with its map, frames of 640 x 480: {surprise['frames_a_second']:.0f} a second, "

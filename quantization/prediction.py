@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
-from export.prediction.bundle import CODES, TRANSFORMER, write_manifest
+from export.prediction.bundle import CODES, GRAPHS, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
@@ -78,6 +78,42 @@ def cost(fp32: Path, int8: Path, frames: np.ndarray, codes: FrameCodes) -> dict[
     return {"equal_codes": round(float((numbers["fp32"] == numbers["int8"]).mean()), 4)} | figures
 
 
+Quality = dict[str, dict[str, float]]  # signal to noise in dB, by graph and output
+
+
+def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings) -> tuple[Quality, dict[str, float]]:
+    """Writes the graphs that see or make pictures into the int8 bundle; returns their quality and what int8 costs."""
+    codes = read_code_file(options.fp32 / CODES)
+    calibrating = frames_of(options.data, options.sets, "train", settings.frames)
+    held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)
+    given = samples(options.fp32, calibrating, codes), samples(options.fp32, held_out, codes)
+    truth = None
+    if (options.fp32 / f"{MENDED}.onnx").exists():
+        before = read_manifest(options.fp32)[MENDED]["before"]
+        for own, split, count in zip(given, ("train", "val"), (settings.frames, settings.held_out_frames), strict=True):
+            own[MENDED], truth = mended_samples(options.data, options.sets, split, count, before)
+    graphs = {name: own for name, own in settings.graphs.items() if name in given[0]}
+    quality = quantize_graphs(options.fp32, options.out, graphs, *given)
+    measured = cost(options.fp32, options.out, held_out, codes)
+    if truth is not None:
+        measured |= mended_cost(options.fp32, options.out, given[1][MENDED], truth)
+    return quality, measured
+
+
+def kept_pictures(options: argparse.Namespace) -> tuple[Quality, dict[str, float]]:
+    """The same from the bundle to be kept. Raises SystemExit where that has other codes, or where the one to be
+    quantized has a network that it lacks."""
+    if (options.keep / CODES).read_bytes() != (options.fp32 / CODES).read_bytes():
+        raise SystemExit(f"{options.keep} has other codes than {options.fp32}: leave --keep out.")
+    if (options.fp32 / f"{MENDED}.onnx").exists():
+        raise SystemExit(f"{options.fp32} has the network that mends motion, too: leave --keep out.")
+    for name in GRAPHS if options.keep.resolve() != options.out.resolve() else ():
+        shutil.copyfile(options.keep / f"{name}.onnx", options.out / f"{name}.onnx")
+    measured = read_manifest(options.keep)["measured"]
+    of_pictures = {name: value for name, value in measured["int8_cost"].items() if not name.startswith("bits")}
+    return {name: own for name, own in measured["sqnr_db"].items() if name in GRAPHS}, of_pictures
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fp32", type=Path, default=Path(".data/bundles/prediction-fp32"))
@@ -87,24 +123,14 @@ def main() -> None:
     parser.add_argument("--codes", type=Path, default=Path(".data/prediction"), help="of clips, for the transformer")
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--settings", type=Path, default=PREDICTION)
+    parser.add_argument(
+        "--keep", type=Path, metavar="DIR", help="int8 bundle of the same codes: its autoencoder is taken as it is"
+    )
     options = parser.parse_args()
     settings = read_settings(options.settings, PredictionSettings)
-    codes = read_code_file(options.fp32 / CODES)
-    calibrating = frames_of(options.data, options.sets, "train", settings.frames)
-    held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)
     options.out.mkdir(parents=True, exist_ok=True)
-    given = samples(options.fp32, calibrating, codes), samples(options.fp32, held_out, codes)
-    truth = None
-    if (options.fp32 / f"{MENDED}.onnx").exists():
-        before = read_manifest(options.fp32)[MENDED]["before"]
-        for own, split, count in zip(given, ("train", "val"), (settings.frames, settings.held_out_frames), strict=True):
-            own[MENDED], truth = mended_samples(options.data, options.sets, split, count, before)
-    graphs = {name: own for name, own in settings.graphs.items() if name in given[0]}
     (options.out / f"{MENDED}.onnx").unlink(missing_ok=True)  # of an earlier bundle
-    quality = quantize_graphs(options.fp32, options.out, graphs, *given)
-    measured = cost(options.fp32, options.out, held_out, codes)
-    if truth is not None:
-        measured |= mended_cost(options.fp32, options.out, given[1][MENDED], truth)
+    quality, measured = kept_pictures(options) if options.keep else quantized_pictures(options, settings)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
     for name in (TRANSFORMER, f"{EXPECTED}.onnx"):  # of an earlier bundle

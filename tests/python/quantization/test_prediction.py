@@ -95,3 +95,25 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     for name in ("encoder.onnx", TRANSFORMER):  # graphs of such small transformers are hardly weights
         sizes = [(folder / name).stat().st_size for folder in (fp32, int8)]
         assert sizes[1] < 0.8 * sizes[0], name
+
+    # The autoencoder of another bundle of the same codes is taken as it is; of one with other codes it is refused.
+    again = tmp_path / "again"
+    words = [
+        "prediction",
+        "--fp32",
+        str(fp32),
+        "--out",
+        str(again),
+        "--keep",
+        str(int8),
+        "--codes",
+        str(tmp_path / "codes"),
+    ]
+    monkeypatch.setattr("sys.argv", words)
+    prediction.main()
+    for name in ("encoder.onnx", "decoder.onnx", TRANSFORMER):
+        assert (again / name).read_bytes() == (int8 / name).read_bytes(), name
+    assert json.loads((again / "manifest.json").read_text())["measured"] == manifest["measured"]
+    (int8 / CODES).write_bytes(b"others")
+    with pytest.raises(SystemExit, match="other codes"):
+        prediction.main()

@@ -19,7 +19,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed, true_fields
+from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed, true_fields, voronoi
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -188,10 +188,12 @@ def measure_fields(given: Sources, networks: Networks, folder: Path, threads: in
         errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
         sets = {name: quality.of_set(read_views(path, WIDTH_PX, view_limit(given, quick)), ways[SHIPPED],
                                      cuts_of(errors.cuts)) for name, path in given.sets.items()}  # fmt: skip
+        of_voronoi = voronoi.measure(val, test, ways[SHIPPED], cuts_of(errors.cuts))
     of_round, why_no_round = round_scans.found_in(given.bundle, threads)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "round": of_round,
+        "voronoi": of_voronoi,
         "missing": {**networks.missing, **errors.missing, **programs_missing()},
         "sheet": pictures.write_sheet(errors.shown, folder).name,
     }  # fmt: skip

@@ -55,6 +55,7 @@ def error_parts(measured: dict) -> list:
         "r or 4 r, those called sharp; false: of the others, those called sharp. Ways without a network find edges "
         "with thresholds of the smallest RMSE; what is nearer to these than r or 4 r is called sharp. Time: the "
         "library's own for our networks; of the ways without a network, Python's and OpenCV's.",
+        *voronoi_parts(measured.get("voronoi")),
         ANCHORS,
         *sheet_parts(measured["sheet"]),
     ]
@@ -65,6 +66,24 @@ def error_parts(measured: dict) -> list:
     parts += [noise_rows(measured["errors"])]
     parts += set_parts(measured["sets"])
     return parts + group_parts(measured["groups"])
+
+
+def voronoi_parts(found: dict | None) -> list:
+    if found is None:
+        return []
+    table = [["on a sample of views", *heads(), "ms"]]
+    for row in found["rows"]:
+        table.append([f"{SAYS[row['level']]}: {row['way']}", *cells(row), f"{row['ms']:.0f}"])
+    radii = "; ".join(
+        f"{SAYS[level]}: cells within {chosen['radii_r'][0]:g} r, averaged over {chosen['radii_r'][1]:g} r, sharp from "
+        f"{chosen['cut']:.3f} on"
+        for level, chosen in found["settings"].items()
+    )
+    return [
+        table,
+        f"Covariance of Voronoi cells (Merigot, Ovsjanikov and Guibas 2011), an own reference in numpy, on "
+        f"{found['views']['test']} of the test views, with what suits {found['views']['val']} validation views: {radii}.",
+    ]
 
 
 def cells(row: dict) -> list[str]:

@@ -54,7 +54,8 @@ Edges::Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, c
       network_(runtime, std::move(bundle), session_settings(*runtime, settings)),
       cancel_(runtime),
       threads_(network_.threads()),
-      resting_(settings.average_frames) {}
+      resting_(settings.average_frames),
+      kept_(settings.keep_frames) {}
 
 void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result) {
   check_input(depth, intrinsics);
@@ -85,9 +86,8 @@ void Edges::run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& r
 void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   EdgeField& field = result.field;
   EdgesStats& stats = result.stats;
-  FieldWindow window{0, 0, round_up(field.width, network_.multiple_px()),
-                     round_up(field.height, network_.multiple_px())};
-  if (int64_t(window.width_px) * window.height_px > kMaxPixels) {
+  const int multiple = network_.multiple_px();
+  if (int64_t(round_up(field.width, multiple)) * round_up(field.height, multiple) > kMaxPixels) {
     throw Error(MAQ_ERROR_IMAGE_SIZE, "The depth frame is ", field.width, " x ", field.height,
                 " pixels, over the limit of ", kMaxPixels, " for the network; use a smaller one.");
   }
@@ -106,12 +106,8 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   stats.depth_ms = float(stage.lap_ms());
 
   const DepthPlane plane{field.depth_m.data(), field.width, field.height};
-  if (stats.known_pixels == 0) {
-    window = {};
-  } else if (skips_planes_) {
-    window = active_.find(plane, field.intrinsics, network_.multiple_px(), threads_);
-    stats.skip_ms = float(stage.lap_ms());
-  }
+  const FieldWindow window = network_window(field, stats.known_pixels > 0);
+  if (skips_planes_ || kept_.is_on()) stats.skip_ms = float(stage.lap_ms());
   clear_outside(window, field);
   if (window.width_px > 0) {
     const float* const slopes = slopes_.make(plane, field.intrinsics, window, threads_);
@@ -121,11 +117,28 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
     stats.network_ms = float(stage.lap_ms());
     stats.broken_pixels = decode_.write(planes, window, threads_, field);
   }
+  if (kept_.is_on()) stats.kept_pixels = kept_.merge(field, threads_);
   stats.decode_ms = float(stage.lap_ms());
   stats.provider = network_.provider();
   stats.threads = network_.threads();
   stats.is_threads_measured = measures_threads_;
   stats.total_ms = float(total.elapsed_ms());
+}
+
+// Where the network must run. Both savings give a half or all of each side; each holds all that it wants to be found
+// anew, and what the network finds beyond is not used, so that the smaller one does where both are on.
+FieldWindow Edges::network_window(const EdgeField& field, bool is_known) {
+  const DepthPlane plane{field.depth_m.data(), field.width, field.height};
+  const int multiple = network_.multiple_px();
+  FieldWindow window{0, 0, round_up(field.width, multiple), round_up(field.height, multiple)};
+  if (kept_.is_on()) window = kept_.find(plane, field.intrinsics, multiple, threads_);
+  if (!is_known) return {};
+  if (skips_planes_ && window.width_px > 0) {
+    const FieldWindow active = active_.find(plane, field.intrinsics, multiple, threads_);
+    if (!overlap(window, active)) return {};
+    if (active.width_px * active.height_px < window.width_px * window.height_px) window = active;
+  }
+  return window;
 }
 
 }  // namespace maq

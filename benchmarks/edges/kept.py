@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from zlib import crc32
@@ -24,7 +24,7 @@ from export.solids.sensors import LEVELS
 
 KEEP_FRAMES = 8
 OPTION = f"field kept for {KEEP_FRAMES} frames"
-SCENES = {"wall": "empty wall", "box": "one box", "shelf": "full shelf"}
+SCENES = ("wall", "box", "shelf")
 NOISES = {"none": "clean", "tof": "tof", "stereo": "stereo"}  # of stub:solids, and the level of each
 PLATE_PX, STEP_PX, NEARER = 40, 4, 0.85  # of a plate that moves before a scene; by its depth
 
@@ -50,12 +50,19 @@ def frames_at_rest(
         yield seen_by(LEVELS[NOISES[noise]], depth, camera.focal_px, rng), camera
 
 
-def measure_savings(bundle: Path, threads: int, size_px: tuple[int, int], frames: int) -> list[dict]:
+def measure_savings(
+    bundle: Path,
+    threads: int,
+    size_px: tuple[int, int],
+    frames: int,
+    scenes: Iterable[str] = SCENES,
+    noises: Iterable[str] = tuple(NOISES),
+) -> list[dict]:
     """For each scene, noise, at rest and with a moving plate: rows as speed.measure_savings has them. Times are means,
     because every so many frames the whole is found again."""
     rows = []
-    for scene in tqdm(SCENES, desc="edges: kept fields", unit="scene", disable=None):
-        for noise in NOISES:
+    for scene in tqdm(scenes, desc="edges: kept fields", unit="scene", disable=None):
+        for noise in noises:
             for moving in (False, True):
                 tally = {"without": [], "with": [], "square": [], "side": [], "share": []}
                 with ExitStack() as stack:
@@ -70,9 +77,7 @@ def measure_savings(bundle: Path, threads: int, size_px: tuple[int, int], frames
                         tally["with"].append(kept.stats.total_ms)
                         tally["square"].append(np.mean((whole.distance - kept.distance)[known] ** 2))
                         tally["side"].append(((whole.distance < 1) != (kept.distance < 1))[known].mean())
-                        tally["share"].append(
-                            kept.stats.network_pixel_count / max(whole.stats.network_pixel_count, 1)
-                        )
+                        tally["share"].append(kept.stats.network_pixel_count / max(whole.stats.network_pixel_count, 1))
                 means = {name: float(np.mean(values)) for name, values in tally.items()}
                 rows.append({"scene": scene, "noise": noise,
                              "option": f"{OPTION}, {'a plate moves' if moving else 'at rest'}",

@@ -19,7 +19,20 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.edges import carton, curves, fused, pictures, planes, quality, round_scans, speed, true_fields, voronoi
+from benchmarks.edges import (
+    carton,
+    curves,
+    fused,
+    kept,
+    pictures,
+    planes,
+    quality,
+    round_scans,
+    sensitivity,
+    speed,
+    true_fields,
+    voronoi,
+)  # fmt: skip
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -218,11 +231,12 @@ def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quic
     with Edges(given.bundle, threads) as shipped:
         of_solids = curves.measure_solids(some, shipped, tuned)
         boxes = curves.measure_boxes(shipped, tuned, *amounts)
+        of_parameters = sensitivity.measure(val, shipped)
     of_true, why_no_true = true_fields.found_in(some, folder)
     of_carton, why_no_carton = carton.found_in(given.bundle)
     of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure(given.bundle, threads, quick, folder))
     document = {"curves": of_solids, "curves_of_true_fields": of_true, "boxes": boxes, "fusion": of_fusion,
-                "carton": of_carton}  # fmt: skip
+                "carton": of_carton, "sensitivity": of_parameters}  # fmt: skip
     figures, missing = curves.figures_from(of_solids, boxes)
     figures |= true_fields.figures_from(of_true)
     figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton)
@@ -239,7 +253,9 @@ def measure_times(given: Sources, networks: Networks, folder: Path, threads: int
     scene_frames = QUICK_FRAMES if quick else curves.SCENE_FRAMES
     # What gates are about comes first, while the machine is quiet.
     of_scenes = curves.measure_scenes(given.bundle, threads, scene_frames)
-    savings = speed.measure_savings(given.bundle, threads, QUICK_FRAMES if quick else SAVING_FRAMES)
+    saving_frames = QUICK_FRAMES if quick else SAVING_FRAMES
+    savings = speed.measure_savings(given.bundle, threads, saving_frames)
+    savings += kept.measure_savings(given.bundle, threads, speed.SMALL_PX, saving_frames)
     of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure_times(given.bundle, threads, quick))
     rows = speed.measure(test, networks.bundles, rivals_of(val), threads)
     document = {"speed": rows, "savings": savings, "curves_of_scenes": of_scenes, "fusion_times": of_fusion}

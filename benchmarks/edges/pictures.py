@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import matplotlib.ticker
 import numpy as np
 
+from benchmarks.edges import sensitivity
 from benchmarks.edges.methods import SHIPPED
 from benchmarks.edges.rivals import RIVALS
 from benchmarks.sweep import pareto
@@ -28,7 +29,7 @@ def write(measured: dict, folder: Path) -> list[Path]:
         drawn["edges-error-against-run-time.png"] = error_against_time
     if measured.get("groups"):
         drawn["edges-groups.png"] = groups
-    written = []
+    written = [sensitivity.draw(measured["sensitivity"], folder)] if measured.get("sensitivity") else []
     for name, draw in drawn.items():
         figure = draw(measured)
         figure.savefig(folder / name, dpi=110, bbox_inches="tight")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from benchmarks.edges import sensitivity
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.pictures import front_of
 from benchmarks.edges.quality import LEVELS
@@ -27,13 +28,16 @@ def section(measured: dict) -> tuple[str, list]:
         parts += error_parts(measured)
     if "curves" in measured:
         parts += curve_parts(measured)
+    if measured.get("sensitivity"):
+        parts += sensitivity_parts(measured["sensitivity"])
     if "speed" in measured:
         parts += [
             *speed_parts(measured["speed"]),
             saving_rows(measured["savings"]),
             "Work that is left out, 320 x 240: the time with the option by that without, the part of the frame that "
             "the network ran on, and how far the field is from the one without it (root mean square, and pixels on the "
-            "other side of r).",
+            "other side of r). Of kept fields times are means, others medians; with noise, both fields are as far from "
+            "the true one.",
             scene_rows(measured["curves_of_scenes"]),
         ]
     parts += fusion_parts(measured.get("fusion"), measured.get("fusion_times"))
@@ -81,8 +85,9 @@ def voronoi_parts(found: dict | None) -> list:
     )
     return [
         table,
-        f"Covariance of Voronoi cells (Merigot, Ovsjanikov and Guibas 2011), an own reference in numpy, on "
-        f"{found['views']['test']} of the test views, with what suits {found['views']['val']} validation views: {radii}.",
+        "Covariance of Voronoi cells (Mérigot, Ovsjanikov and Guibas 2011), an own reference in numpy, on "
+        f"{found['views']['test']} of the test views, with what suits {found['views']['val']} validation views: "
+        f"{radii}.",
     ]
 
 
@@ -188,6 +193,19 @@ def scene_rows(rows: list[dict]) -> list[list[str]]:
         times = [f"{row[key]:.2f}" for key in ("field_ms", "curves_ms", "boxes_ms")]
         table.append([f"{SCENES[row['scene']]}, {row['noise']}", *curve_cells(row), *times, f"{1000 / row['ms']:.0f}"])
     return table
+
+
+def sensitivity_parts(rows: list[dict]) -> list:
+    table = [["parameter of curves", "half, shipped, double", *(f"F, {SAYS[level]}" for level in LEVELS)]]
+    for row in rows:
+        scores = (", ".join(f"{value:.3f}" for value in row["f_score"][level]) for level in LEVELS)
+        table.append([f"`{row['parameter']}`", ", ".join(f"{value:g}" for value in row["values"]), *scores])
+    return [
+        (sensitivity.PICTURE, "F-score of curves with half and double of each parameter of extraction."),
+        table,
+        f"Means over {sensitivity.VIEWS} validation views at most, of the network's fields; other parameters have "
+        "their defaults.",
+    ]
 
 
 def curve_parts(measured: dict) -> list:

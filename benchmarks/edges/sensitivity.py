@@ -83,7 +83,7 @@ def draw(rows: Sequence[dict], folder: Path) -> Path:
             # One scale for all parameters of a level.
             every = [value for other in rows for value in other["f_score"][level]]
             margin = 0.25 * (max(every) - min(every)) + 1e-3
-            axis.set(xscale="log", ylim=(min(every) - margin, max(every) + margin))
+            axis.set(xscale="log", xlim=(0.42, 2.4), ylim=(min(every) - margin, max(every) + margin))
             axis.set_xticks(FACTORS, ["half", "shipped", "double"], fontsize=7)
             axis.minorticks_off()
             axis.tick_params(axis="y", labelsize=6)

@@ -23,11 +23,36 @@ def signature(config: NetworkConfig) -> dict[str, dict[str, list[int | str]]]:
     }
 
 
+def reads_input_first(path: Path) -> bool:
+    """Whether a graph has read its input before it writes its output, so that both may lie in the same memory: one node
+    reads it, another one writes the output, and what others compute comes from the first."""
+    import onnx  # only writers need it
+
+    graph = onnx.load(path).graph
+    (given,), (wanted,) = graph.input, graph.output
+    readers = [node for node in graph.node if given.name in node.input]
+    if len(readers) != 1 or wanted.name in readers[0].output:
+        return False
+    before, left = {wanted.name}, [wanted.name]
+    makers = {name: node for node in graph.node for name in node.output}
+    while left:  # all that the output is made of
+        node = makers.get(left.pop())
+        new = [name for name in (node.input if node else ()) if name not in before]
+        before.update(new)
+        left += new
+    return bool(before & set(readers[0].output))
+
+
 def write_manifest(folder: Path, info: BundleInfo, multiple: int) -> dict:
     """Describes the graph that lies in `folder`, of any precision, and writes `manifest.json`, which it returns.
 
     multiple: sides of the frames are multiples of it, pixels.
     """
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
-    task_keys = {"field": {"eps_r": EPS_R, "multiple_px": multiple}}
+    field = {
+        "eps_r": EPS_R,
+        "multiple_px": multiple,
+        "output_over_input": int(reads_input_first(folder / "field.onnx")),
+    }
+    task_keys = {"field": field}
     return write_bundle_manifest(folder, "edges", info, graphs, files=(), task_keys=task_keys)

@@ -34,11 +34,11 @@ typedef struct maq_edges_config {
                              camera at rest, which takes noise away. Areas of 32 x 32 px in which something moves, and
                              pixels that jump, begin anew; unknown depth stays unknown. 0 (default), 1: each frame is
                              on its own */
-  int32_t keep_frames;    /* 2 to 64: areas of 32 x 32 px whose depth does not change beyond the sensor's noise have the
-                             same field for so many frames, then it is found again; the network runs on the part of
-                             the frame, half or all of each side, that has the others. For a camera at rest; with
-                             average_frames, a field is of the mean that there was when it was found. 0 (default), 1:
-                             each frame's field is its own */
+  int32_t keep_frames;    /* 2 to 64: areas of 32 x 32 px where nothing moves by more than a pixel, a footprint or the
+                             sensor's noise have the same field for so many frames, then it is found again; the network
+                             runs on the part of the frame, half or all of each side, that has the others. For a camera
+                             at rest; with average_frames, fields are of the mean of when they were found. 0 (default),
+                             1: each frame's field is its own */
 } maq_edges_config;
 
 /* The planes of a result: a value a pixel of the depth frame. */

@@ -31,17 +31,16 @@ struct Sums {
     size += std::abs(difference);
   }
 
-  // Whether they are those of a surface that moved.
-  bool is_motion() const {
-    if (n < kMinKnown_px) return true;  // nothing tells that it rests
+  // The sum of squares that a plane explains.
+  double explained() const {
     const double cxx = xx - x * x / n, cxy = xy - x * y / n, cyy = yy - y * y / n;
     const double cxd = dx - x * d / n, cyd = dy - y * d / n;
     const double determinant = cxx * cyy - cxy * cxy;
-    double explained = d * d / n;
+    double sum = d * d / n;
     if (determinant > 1e-9 * cxx * cyy) {
-      explained += (cyy * cxd * cxd - 2 * cxy * cxd * cyd + cxx * cyd * cyd) / determinant;
+      sum += (cyy * cxd * cxd - 2 * cxy * cxd * cyd + cxx * cyd * cyd) / determinant;
     }
-    return explained > kMotion * dd;
+    return sum;
   }
 };
 
@@ -63,7 +62,14 @@ AreaMotion motion_of(const float* metres, const float* inverse, int width_px, co
     }
     limit = sums.n > 0 ? kTrim * sums.size / sums.n : 0;
   }
-  return {sums.is_motion(), sums.n > 0 ? kJumpDifferences * float(sums.size / sums.n) : 0};
+  AreaMotion found;
+  if (sums.n == 0) return found;
+  const double explained = sums.explained();
+  // Of too few pixels nothing tells that they rest.
+  found.moved = sums.n < kMinKnown_px || explained > kMotion * sums.dd;
+  found.shift = std::sqrt(explained / sums.n);
+  found.jump = kJumpDifferences * float(sums.size / sums.n);
+  return found;
 }
 
 }  // namespace maq

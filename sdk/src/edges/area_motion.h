@@ -14,6 +14,7 @@ struct PixelArea {
 
 struct AreaMotion {
   bool moved = true;  // or too little is known to tell
+  double shift = 0;   // of the surface, root mean square of what a plane explains, 1 / metres
   float jump = 0;     // difference of inverse depth beyond which a pixel has changed by itself, 1 / metres
 };
 

@@ -59,11 +59,10 @@ void mirror_columns(int inside, int count, float* across, float* down, float* kn
 
 }  // namespace
 
-const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
-                               WorkerThreads& threads) {
+void DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
+                       WorkerThreads& threads, float* values) {
   const size_t width = size_t(window.width_px), cells = width / kFold;
   const int rows = window.height_px / kFold;
-  values_.resize(size_t(rows) * cells * kChannels);
   const size_t scratch = (kDepthRows + kMirroredRows) * (width + 1) + (1 + kPlaneRows) * width;
   rows_.resize(scratch * size_t(threads.count()));
   const float fx = float(intrinsics.fx_px), fy = float(intrinsics.fy_px);
@@ -98,7 +97,7 @@ const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrin
         }
         if (is_wider) mirror_columns(inside, window.width_px, across, down, known);
       }
-      float* cell = values_.data() + size_t(row) * cells * kChannels;
+      float* cell = values + size_t(row) * cells * kChannels;
       for (size_t x = 0; x < width; x += kFold, cell += kChannels) {
         for (size_t i = 0; i < kPlaneRows; ++i)
           std::memcpy(cell + kFold * i, planes + i * width + x, 2 * sizeof(float));
@@ -106,7 +105,6 @@ const float* DepthSlopes::make(const DepthPlane& depth, const Intrinsics& intrin
       std::swap(depths[0], depths[2]);
     }
   });
-  return values_.data();
 }
 
 }  // namespace maq

@@ -27,13 +27,15 @@ class DepthSlopes {
   // (x, y) of 2 x 2 in plane c. Planes 0 and 1: g / (1 + |g|) of the slope g = f z d(1/z) towards the next pixel in x
   // and in y, in metres of depth a metre sideways, 0 where either pixel is unknown and where the window ends with the
   // frame. Plane 2: 1 where depth is known. Beyond the frame's border the planes are mirrored, so that surfaces go on
-  // there: unknown depth would look like their end. Stays until the next call; takes no memory for a window no larger
-  // than those before.
-  const float* make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window,
-                    WorkerThreads& threads);
+  // there: unknown depth would look like their end. `values` has room for count(window) of them. Takes no memory for a
+  // window no larger than those before.
+  void make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window, WorkerThreads& threads,
+            float* values);
+  static size_t count(const FieldWindow& window) {
+    return size_t(window.width_px / kFold) * size_t(window.height_px / kFold) * kChannels;
+  }
 
  private:
-  std::vector<float> values_;
   std::vector<float> rows_;  // scratch of each worker
 };
 

@@ -1,5 +1,7 @@
 #include "edges/edge_network.h"
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/rounding.h"
 #include "edges/depth_slopes.h"
@@ -44,6 +46,11 @@ int checked_multiple_px(const Manifest& manifest) {
   return multiple_px;
 }
 
+bool is_output_over_input(const Manifest& manifest) {
+  const auto found = manifest.root.at("field").find("output_over_input");
+  return found && found->integer(0, 1) == 1;
+}
+
 Shape input_shape(int width_px, int height_px) {
   return {1, height_px / kFold, width_px / kFold, DepthSlopes::kChannels};
 }
@@ -85,16 +92,27 @@ EdgeNetwork::EdgeNetwork(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bund
       eps_r_(bundle_.manifest.root.at("field").at("eps_r").number(1, kMaxEps_r)),
       multiple_px_(checked_multiple_px(bundle_.manifest)),
       threads_(threads_of(runtime, bundle_, multiple_px_, settings)),
+      is_shared_(is_output_over_input(bundle_.manifest)),
       sessions_(std::move(runtime), bundle_.files.at(bundle_.manifest.graphs.at(kGraph).file),
                 bundle_.manifest.graphs.at(kGraph), bundle_.path_of(bundle_.manifest.graphs.at(kGraph).file),
                 of_stream(settings, threads_), kSessionsKept) {}
 
-const float* EdgeNetwork::run(const float* slopes, int width_px, int height_px, const RunCancel& cancel) {
-  inputs_.assign(1, {slopes, input_shape(width_px, height_px)});
+float* EdgeNetwork::input(int width_px, int height_px) {
+  const size_t cells = size_t(width_px / kFold) * size_t(height_px / kFold);
+  const size_t channels =
+      is_shared_ ? std::max(DepthSlopes::kChannels, FieldDecode::kChannels) : DepthSlopes::kChannels;
+  if (values_.size() < cells * channels) values_.resize(cells * channels);
+  return values_.data();
+}
+
+const float* EdgeNetwork::run(int width_px, int height_px, const RunCancel& cancel) {
+  inputs_.assign(1, {values_.data(), input_shape(width_px, height_px)});
   shapes_.assign(1, output_shape(width_px, height_px));
   Session& session = sessions_.at(width_px / kFold, height_px / kFold);
   provider_ = session.provider();
-  return session.run(inputs_, shapes_, &cancel)[0].data;
+  // Other providers may hand both to a device at once.
+  float* const output = is_shared_ && provider_ == MAQ_PROVIDER_CPU ? values_.data() : nullptr;
+  return session.run(inputs_, shapes_, &cancel, output)[0].data;
 }
 
 }  // namespace maq

@@ -25,10 +25,12 @@ class EdgeNetwork {
   // Sides of what it is run on are multiples of it.
   int multiple_px() const { return multiple_px_; }
 
-  // `slopes` as DepthSlopes makes them, of such a size -> planes as FieldDecode reads them, until the next run. Not for
-  // two threads at once. Throws MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says,
+  // Room for the slopes of such a size, as DepthSlopes makes them.
+  float* input(int width_px, int height_px);
+  // These slopes -> planes as FieldDecode reads them, until the next use; the slopes are lost. Not for two threads at
+  // once. Throws MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says,
   // MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
-  const float* run(const float* slopes, int width_px, int height_px, const RunCancel& cancel);
+  const float* run(int width_px, int height_px, const RunCancel& cancel);
 
   // In use for the latest run.
   maq_provider provider() const { return provider_; }
@@ -38,6 +40,8 @@ class EdgeNetwork {
   float eps_r_ = 0;
   int multiple_px_ = 0;
   int threads_ = 0;
+  bool is_shared_ = false;     // the graph has read its input before it writes its output
+  std::vector<float> values_;  // its input and, where it is shared, its output
   SizedSessions sessions_;
   maq_provider provider_ = MAQ_PROVIDER_CPU;
   std::vector<TensorView> inputs_;

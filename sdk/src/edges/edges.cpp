@@ -110,9 +110,9 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   if (skips_planes_ || kept_.is_on()) stats.skip_ms = float(stage.lap_ms());
   clear_outside(window, field);
   if (window.width_px > 0) {
-    const float* const slopes = slopes_.make(plane, field.intrinsics, window, threads_);
+    slopes_.make(plane, field.intrinsics, window, threads_, network_.input(window.width_px, window.height_px));
     stats.slopes_ms = float(stage.lap_ms());
-    const float* const planes = network_.run(slopes, window.width_px, window.height_px, cancel_);
+    const float* const planes = network_.run(window.width_px, window.height_px, cancel_);
     stats.network_pixels = int64_t(window.width_px) * window.height_px;
     stats.network_ms = float(stage.lap_ms());
     stats.broken_pixels = decode_.write(planes, window, threads_, field);

@@ -10,8 +10,10 @@ namespace maq {
 namespace {
 
 constexpr int kKeptArea_px = 32;
-// Pixels of an area that jump, or come to be known or unknown, without an end of what is kept there: a few do at every
-// frame where surfaces end.
+constexpr int kMinKept_px = 16;  // pixels of an area, to tell motion from noise
+// What the field does not show: it changes by a footprint where its edges move by that.
+constexpr double kMaxShift_r = 1;
+// Pixels of an area that jump, or come to be known or unknown, without an end of what is kept there.
 constexpr int kMaxOdd_px = 8;
 
 }  // namespace
@@ -23,23 +25,51 @@ PixelArea KeptField::area_at(int column, int row) const {
   return {left, top, std::min(left + kKeptArea_px, camera_.width_px), std::min(top + kKeptArea_px, camera_.height_px)};
 }
 
+// Where surfaces end, sensors mix both sides of a pixel or lose it, other ones at every frame.
+bool KeptField::is_flicker(float metres, int x, int y, float jump) const {
+  float lowest = HUGE_VALF, highest = 0;
+  bool has_unknown = false;
+  for (int i = std::max(0, y - 1); i <= std::min(y + 1, camera_.height_px - 1); ++i) {
+    for (int j = std::max(0, x - 1); j <= std::min(x + 1, camera_.width_px - 1); ++j) {
+      const float inverse = inverse_[size_t(i) * size_t(camera_.width_px) + size_t(j)];
+      if (!(inverse > 0)) {
+        has_unknown = true;
+        continue;
+      }
+      lowest = std::min(lowest, inverse);
+      highest = std::max(highest, inverse);
+    }
+  }
+  if (!(metres > 0)) return has_unknown || highest - lowest > 4 * jump;
+  return 1 / metres >= lowest - jump && 1 / metres <= highest + jump;
+}
+
 bool KeptField::has_changed(const float* metres, const PixelArea& area) const {
-  int both = 0, odd = 0;
+  int both = 0, before = 0, odd = 0;
+  double sum = 0;
   const auto for_each_pixel = [&](auto&& work) {
     for (int y = area.top; y < area.bottom; ++y) {
-      for (int x = area.left; x < area.right; ++x) work(size_t(y) * size_t(camera_.width_px) + size_t(x));
+      for (int x = area.left; x < area.right; ++x) work(x, y, size_t(y) * size_t(camera_.width_px) + size_t(x));
     }
   };
-  for_each_pixel([&](size_t at) {
-    const bool is_known = metres[at] > 0, was_known = inverse_[at] > 0;
-    both += int(is_known && was_known);
-    odd += int(is_known != was_known);
+  for_each_pixel([&](int, int, size_t at) {
+    const bool was_known = inverse_[at] > 0;
+    before += int(was_known);
+    both += int(was_known && metres[at] > 0);
+    sum += was_known ? double(inverse_[at]) : 0;
   });
-  if (both == 0 || odd > kMaxOdd_px) return odd > kMaxOdd_px;
-  const auto [moved, jump] = motion_of(metres, inverse_.data(), camera_.width_px, area);
-  if (moved) return true;
-  for_each_pixel([&, limit = jump](size_t at) {
-    odd += int(metres[at] > 0 && inverse_[at] > 0 && std::abs(1 / metres[at] - inverse_[at]) > limit);
+  // As a difference of inverse depth.
+  const double footprint = before == 0 ? 0 : sum / before / std::sqrt(camera_.fx_px * camera_.fy_px);
+  float jump = float(kMaxShift_r * footprint);  // where little is known
+  if (both >= kMinKept_px) {
+    const AreaMotion motion = motion_of(metres, inverse_.data(), camera_.width_px, area);
+    if (motion.moved && motion.shift > kMaxShift_r * footprint) return true;
+    jump = std::max(jump, motion.jump);
+  }
+  for_each_pixel([&](int x, int y, size_t at) {
+    const bool is_known = metres[at] > 0, was_known = inverse_[at] > 0;
+    const bool is_same = is_known == was_known && (!is_known || std::abs(1 / metres[at] - inverse_[at]) <= jump);
+    odd += int(!is_same && !is_flicker(metres[at], x, y, jump));
   });
   return odd > kMaxOdd_px;
 }

@@ -1,7 +1,7 @@
 // Areas of a stream whose depth did not change keep the field of an earlier frame, and the network runs on the others.
 //
 // Depth is compared with that of the frame that an area's field is from, not with the frame before: what moves slowly
-// is noticed as soon as it has moved by more than the noise.
+// is noticed as soon as it has moved by more than a footprint, or than the noise where that is more.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,7 @@ class KeptField {
   int64_t merge(EdgeField& field, WorkerThreads& threads);
 
  private:
+  bool is_flicker(float metres, int x, int y, float jump) const;
   bool has_changed(const float* metres, const PixelArea& area) const;
   PixelArea area_at(int column, int row) const;
   int64_t merge_area(EdgeField& field, const PixelArea& area, size_t index);

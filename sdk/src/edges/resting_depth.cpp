@@ -49,7 +49,9 @@ int64_t RestingDepth::add_area(float* metres, const PixelArea& area) {
       for (int x = area.left; x < area.right; ++x) work(x, y, size_t(y) * size_t(camera_.width_px) + size_t(x));
     }
   };
-  const auto [moved, jump] = motion_of(metres, inverse_.data(), camera_.width_px, area);
+  const AreaMotion motion = motion_of(metres, inverse_.data(), camera_.width_px, area);
+  const bool moved = motion.moved;
+  const float jump = motion.jump;
   int64_t averaged = 0;
   for_each_pixel([&](int, int, size_t at) {
     if (!(metres[at] > 0)) {

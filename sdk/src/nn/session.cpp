@@ -240,7 +240,8 @@ void Session::bind(Binding& binding, const float* data, const Shape& shape) {
 }
 
 const std::vector<TensorView>& Session::run(const std::vector<TensorView>& inputs,
-                                            const std::vector<Shape>& output_shapes, const RunCancel* cancel) {
+                                            const std::vector<Shape>& output_shapes, const RunCancel* cancel,
+                                            float* first_output) {
   for (size_t i = 0; i < inputs_.size(); ++i) {
     bind(inputs_[i], inputs[i].data, inputs[i].shape);
     input_values_[i] = inputs_[i].value;
@@ -248,10 +249,12 @@ const std::vector<TensorView>& Session::run(const std::vector<TensorView>& input
   for (size_t i = 0; i < outputs_.size(); ++i) {
     int64_t size = 1;
     for (const int64_t extent : output_shapes[i]) size *= extent;
-    if (buffers_[i].size() < size_t(size)) buffers_[i].resize(size_t(size));
-    bind(outputs_[i], buffers_[i].data(), output_shapes[i]);
+    const bool is_given = i == 0 && first_output != nullptr;
+    if (!is_given && buffers_[i].size() < size_t(size)) buffers_[i].resize(size_t(size));
+    float* const memory = is_given ? first_output : buffers_[i].data();
+    bind(outputs_[i], memory, output_shapes[i]);
     output_values_[i] = outputs_[i].value;
-    views_[i].data = buffers_[i].data();
+    views_[i].data = memory;
     views_[i].shape = output_shapes[i];
   }
   OrtStatus* status = runtime_->api().Run(session_, cancel == nullptr ? nullptr : cancel->options_, input_names_.data(),

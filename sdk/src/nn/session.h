@@ -94,9 +94,10 @@ class Session {
   // Runs the network on its inputs, in the order of the spec. The outputs, of the shapes that the caller expects and in
   // the order of the spec, lie in memory of the session and stay until the next run. Not for two threads at once.
   // Throws MAQ_ERROR_INFERENCE, also when an output has another shape; MAQ_CANCELLED, between two nodes of the graph,
-  // where `cancel` says so.
+  // where `cancel` says so. `first_output`: memory for the first output instead of the session's; that of an input
+  // where the graph has read this before it writes.
   const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
-                                     const RunCancel* cancel = nullptr);
+                                     const RunCancel* cancel = nullptr, float* first_output = nullptr);
 
   // The one in use.
   maq_provider provider() const { return provider_; }

@@ -40,7 +40,9 @@ Unfolded slopes_of(const std::vector<float>& depth, const Intrinsics& camera, in
   maq::WorkerThreads workers(threads);
   DepthSlopes slopes;
   const FieldWindow window{0, 0, (camera.width_px + 1) / 2 * 2, (camera.height_px + 1) / 2 * 2};
-  return unfolded(slopes.make({depth.data(), camera.width_px, camera.height_px}, camera, window, workers), window);
+  std::vector<float> values(DepthSlopes::count(window));
+  slopes.make({depth.data(), camera.width_px, camera.height_px}, camera, window, workers, values.data());
+  return unfolded(values.data(), window);
 }
 
 // A plane a x' + b y' + c of inverse depth, where x' and y' are directions: its slopes are a / (1/z) and b / (1/z).
@@ -67,8 +69,9 @@ TEST(DepthSlopes, EqualTorch) {
     maq::WorkerThreads threads(1);
     DepthSlopes slopes;
     const FieldWindow window{0, 0, (size.width + 3) / 4 * 4, (size.height + 3) / 4 * 4};
-    const float* found = slopes.make({depth.data(), size.width, size.height}, size.intrinsics(), window, threads);
-    ASSERT_EQ(expected.size(), size_t(window.width_px / 2 * window.height_px / 2 * DepthSlopes::kChannels));
+    std::vector<float> found(DepthSlopes::count(window));
+    slopes.make({depth.data(), size.width, size.height}, size.intrinsics(), window, threads, found.data());
+    ASSERT_EQ(expected.size(), found.size());
     for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(found[i], expected[i], 1e-6) << size.name() << " " << i;
   }
 }
@@ -167,10 +170,15 @@ TEST(DepthSlopes, OfAWindowAreThoseOfTheFrameThereWhicheverThreadsAreAtWork) {
   maq::WorkerThreads one(1), two(2);
   DepthSlopes slopes;
   const FieldWindow all{0, 0, 90, 150};  // beyond the frame there are mirrors
-  const Unfolded whole = unfolded(slopes.make({depth.data(), 75, 133}, camera, all, one), all);
+  const auto of_window = [&](const FieldWindow& window, maq::WorkerThreads& threads) {
+    std::vector<float> values(DepthSlopes::count(window));
+    slopes.make({depth.data(), 75, 133}, camera, window, threads, values.data());
+    return unfolded(values.data(), window);
+  };
+  const Unfolded whole = of_window(all, one);
   for (const FieldWindow& window :
        {FieldWindow{0, 0, 76, 134}, {10, 24, 40, 64}, {40, 100, 36, 36}, {60, 124, 20, 20}}) {
-    const Unfolded part = unfolded(slopes.make({depth.data(), 75, 133}, camera, window, two), window);
+    const Unfolded part = of_window(window, two);
     for (int y = 0; y < window.height_px; ++y) {
       for (int x = 0; x < window.width_px; ++x) {
         const size_t at = size_t(y) * size_t(window.width_px) + size_t(x);

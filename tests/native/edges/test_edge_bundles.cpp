@@ -42,9 +42,33 @@ TEST_F(EdgeBundles, OfAnotherTaskOrWithoutWhatIsReadAreRefused) {
   for (const json& multiple : {json(0), json(3), json(512), json(2.5)}) {
     expect_refused(with("multiple_px", multiple), MAQ_ERROR_BAD_BUNDLE, "field.multiple_px");
   }
+  for (const json& shared : {json(2), json(true), json("1")}) {
+    expect_refused(with("output_over_input", shared), MAQ_ERROR_BAD_BUNDLE, "field.output_over_input");
+  }
   changed = manifest_;
   changed.erase("field");
   expect_refused(changed, MAQ_ERROR_BAD_BUNDLE, "field");
+}
+
+TEST_F(EdgeBundles, ThatWriteTheOutputOverTheInputGiveTheSame) {
+  json changed = manifest_;
+  changed["field"]["output_over_input"] = 1;
+  write_text(folder_.file("manifest.json"), changed.dump());
+  const auto apart = tiny_edges::edges();
+  maq::EdgesSettings settings;
+  settings.spin = false;
+  maq::Edges shared(tiny_edges::runtime(), maq::read_bundle(folder_.path().string()), settings);
+  for (int round = 0; round < 2; ++round) {
+    for (const tiny_edges::Case& size : tiny_edges::kCases) {
+      const std::vector<float> depth = size.read("depth");
+      maq::EdgesResult expected, found;
+      apart->run(tiny_edges::view_of(depth, size.width, size.height), size.intrinsics(), expected);
+      shared.run(tiny_edges::view_of(depth, size.width, size.height), size.intrinsics(), found);
+      EXPECT_EQ(found.field.distance_r, expected.field.distance_r) << size.name();
+      EXPECT_EQ(found.field.spread_r, expected.field.spread_r);
+      EXPECT_EQ(found.field.kind, expected.field.kind);
+    }
+  }
 }
 
 TEST_F(EdgeBundles, WithAnotherGraphAreRefused) {

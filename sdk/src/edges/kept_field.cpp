@@ -15,6 +15,7 @@ constexpr int kMinKept_px = 16;  // pixels of an area, to tell motion from noise
 constexpr double kMaxShift_r = 1;
 // Pixels of an area that jump, or come to be known or unknown, without an end of what is kept there.
 constexpr int kMaxOdd_px = 8;
+constexpr int kMinHole_px = 5;  // unknown pixels of 3 x 3 in a hole
 
 }  // namespace
 
@@ -25,23 +26,27 @@ PixelArea KeptField::area_at(int column, int row) const {
   return {left, top, std::min(left + kKeptArea_px, camera_.width_px), std::min(top + kKeptArea_px, camera_.height_px)};
 }
 
-// Where surfaces end, sensors mix both sides of a pixel or lose it, other ones at every frame.
-bool KeptField::is_flicker(float metres, int x, int y, float jump) const {
+// Sensors lose single pixels anywhere, other ones at every frame; where surfaces end, they mix both sides, too.
+bool KeptField::is_flicker(const float* metres, int x, int y, float jump) const {
   float lowest = HUGE_VALF, highest = 0;
-  bool has_unknown = false;
+  int unknown = 0, unknown_before = 0;  // the pixel itself included
   for (int i = std::max(0, y - 1); i <= std::min(y + 1, camera_.height_px - 1); ++i) {
     for (int j = std::max(0, x - 1); j <= std::min(x + 1, camera_.width_px - 1); ++j) {
-      const float inverse = inverse_[size_t(i) * size_t(camera_.width_px) + size_t(j)];
+      const size_t at = size_t(i) * size_t(camera_.width_px) + size_t(j);
+      const float inverse = inverse_[at];
+      unknown += int(!(metres[at] > 0));
       if (!(inverse > 0)) {
-        has_unknown = true;
+        ++unknown_before;
         continue;
       }
       lowest = std::min(lowest, inverse);
       highest = std::max(highest, inverse);
     }
   }
-  if (!(metres > 0)) return has_unknown || highest - lowest > 4 * jump;
-  return 1 / metres >= lowest - jump && 1 / metres <= highest + jump;
+  const size_t at = size_t(y) * size_t(camera_.width_px) + size_t(x);
+  if (!(metres[at] > 0)) return unknown < kMinHole_px || unknown_before > 0 || highest - lowest > 4 * jump;
+  if (!(inverse_[at] > 0) && unknown_before < kMinHole_px) return true;
+  return 1 / metres[at] >= lowest - jump && 1 / metres[at] <= highest + jump;
 }
 
 bool KeptField::has_changed(const float* metres, const PixelArea& area) const {
@@ -69,7 +74,7 @@ bool KeptField::has_changed(const float* metres, const PixelArea& area) const {
   for_each_pixel([&](int x, int y, size_t at) {
     const bool is_known = metres[at] > 0, was_known = inverse_[at] > 0;
     const bool is_same = is_known == was_known && (!is_known || std::abs(1 / metres[at] - inverse_[at]) <= jump);
-    odd += int(!is_same && !is_flicker(metres[at], x, y, jump));
+    odd += int(!is_same && !is_flicker(metres, x, y, jump));
   });
   return odd > kMaxOdd_px;
 }

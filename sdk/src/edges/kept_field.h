@@ -34,7 +34,7 @@ class KeptField {
   int64_t merge(EdgeField& field, WorkerThreads& threads);
 
  private:
-  bool is_flicker(float metres, int x, int y, float jump) const;
+  bool is_flicker(const float* metres, int x, int y, float jump) const;
   bool has_changed(const float* metres, const PixelArea& area) const;
   PixelArea area_at(int column, int row) const;
   int64_t merge_area(EdgeField& field, const PixelArea& area, size_t index);

@@ -5,7 +5,8 @@
 
 A short training on other data gains there and loses elsewhere; between its weights and those that it started from lie
 weights that keep most of both (Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022). Weights that the
-first file does not have are the second's.
+first file does not have are the second's. The evidence of people is trained alone, after everything else: it is left out
+where the second file has none.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ def averaged(start: dict, trained: dict, fraction: float) -> dict:
     weights = dict(trained["ema"])
     for name, before in start["ema"].items():
         after = weights.get(name)
+        if after is None and name.startswith("evidence."):
+            continue
         if after is None or after.shape != before.shape:
             raise ValueError(f"{name} is not in both, or of another shape: was one trained from the other?")
         if after.is_floating_point():

@@ -28,6 +28,12 @@ def test_half_precision_is_averaged_in_full_and_stays_half():
     assert torch.isfinite(averaged(start, trained, 0.5)["ema"]["x"]).all()
 
 
+def test_evidence_of_people_is_left_out_where_the_trained_weights_have_none():
+    found = averaged(weights(1, **{"evidence.out.weight": torch.ones(1)}), weights(3), 0.5)
+    assert "evidence.out.weight" not in found["ema"]
+    assert torch.equal(found["ema"]["conv"], torch.full((2, 2), 2.0))
+
+
 def test_weights_of_another_network_are_refused():
     with pytest.raises(ValueError, match="other is not in both"):
         averaged(weights(1, other=torch.ones(1)), weights(3), 0.5)

@@ -5,8 +5,8 @@
 
 A short training on other data gains there and loses elsewhere; between its weights and those that it started from lie
 weights that keep most of both (Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022). Weights that the
-first file does not have are the second's. The evidence of people is trained alone, after everything else: it is left out
-where the second file has none.
+first file does not have are the second's. The evidence of people is trained alone, after everything else: it is left
+out where the second file has none.
 """
 
 from __future__ import annotations

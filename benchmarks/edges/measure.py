@@ -23,7 +23,6 @@ from benchmarks.edges import (
     carton,
     curves,
     fused,
-    kept,
     pictures,
     planes,
     quality,
@@ -255,7 +254,6 @@ def measure_times(given: Sources, networks: Networks, folder: Path, threads: int
     of_scenes = curves.measure_scenes(given.bundle, threads, scene_frames)
     saving_frames = QUICK_FRAMES if quick else SAVING_FRAMES
     savings = speed.measure_savings(given.bundle, threads, saving_frames)
-    savings += kept.measure_savings(given.bundle, threads, speed.SMALL_PX, saving_frames)
     of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure_times(given.bundle, threads, quick))
     rows = speed.measure(test, networks.bundles, rivals_of(val), threads)
     document = {"speed": rows, "savings": savings, "curves_of_scenes": of_scenes, "fusion_times": of_fusion}

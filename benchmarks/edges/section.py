@@ -36,8 +36,7 @@ def section(measured: dict) -> tuple[str, list]:
             saving_rows(measured["savings"]),
             "Work that is left out, 320 x 240: the time with the option by that without, the part of the frame that "
             "the network ran on, and how far the field is from the one without it (root mean square, and pixels on the "
-            "other side of r). Of kept fields times are means, others medians; with noise, both fields are as far from "
-            "the true one.",
+            "other side of r).",
             scene_rows(measured["curves_of_scenes"]),
         ]
     parts += fusion_parts(measured.get("fusion"), measured.get("fusion_times"))

@@ -34,11 +34,6 @@ typedef struct maq_edges_config {
                              camera at rest, which takes noise away. Areas of 32 x 32 px in which something moves, and
                              pixels that jump, begin anew; unknown depth stays unknown. 0 (default), 1: each frame is
                              on its own */
-  int32_t keep_frames;    /* 2 to 64: areas of 32 x 32 px where nothing moves by more than a pixel, a footprint or the
-                             sensor's noise have the same field for so many frames, then it is found again; the network
-                             runs on the part of the frame, half or all of each side, that has the others. For a camera
-                             at rest; with average_frames, fields are of the mean of when they were found. 0 (default),
-                             1: each frame's field is its own */
 } maq_edges_config;
 
 /* The planes of a result: a value a pixel of the depth frame. */
@@ -70,20 +65,19 @@ typedef struct maq_edges_field {
 typedef struct maq_edges_stats {
   uint32_t struct_size;
   float depth_ms;  /* depth to metres, and average_frames */
-  float skip_ms;   /* where the network must run (skip_planes, keep_frames) */
+  float skip_ms;   /* where the network must run (skip_planes) */
   float slopes_ms; /* the network's input: slopes of inverse depth */
   float network_ms;
   float decode_ms;
   float total_ms;
   int64_t known_pixel_count;    /* whose depth is known */
   int64_t network_pixel_count;  /* that the network was run on; 0: nothing was known, or all was planes that were
-                                   skipped, or was kept */
+                                   skipped */
   int64_t broken_pixel_count;   /* for which the network gave no number, but NaN: they have the distance eps_r */
   maq_provider provider;        /* in use for the network */
   int32_t threads;              /* of the network; fewer where the system starts no more, as the log says then */
   int32_t is_threads_measured;  /* 1: that number was chosen by MAQ_THREADS_MEASURED */
   int64_t averaged_pixel_count; /* whose depth is the mean of several frames (average_frames) */
-  int64_t kept_pixel_count;     /* whose field is that of an earlier frame (keep_frames) */
 } maq_edges_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_edges_config) of the caller.

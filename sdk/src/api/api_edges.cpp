@@ -39,14 +39,12 @@ EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* na
   require_provider(prefix + "provider", config.provider);
   require_range(prefix + "skip_planes", config.skip_planes, 0, 1);
   require_range(prefix + "average_frames", config.average_frames, 0, RestingDepth::kMaxFrames);
-  require_range(prefix + "keep_frames", config.keep_frames, 0, KeptField::kMaxFrames);
   EdgesSettings settings;
   settings.threads = config.threads != 0 ? config.threads : default_threads();
   settings.spin = config.allow_spinning == 1;
   settings.provider = config.provider;
   settings.skips_planes = config.skip_planes == 1;
   settings.average_frames = std::max(config.average_frames, 1);
-  settings.keep_frames = std::max(config.keep_frames, 1);
   return settings;
 }
 
@@ -166,7 +164,6 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
     filled.averaged_pixel_count = from.averaged_pixels;
-    filled.kept_pixel_count = from.kept_pixels;
     write_struct(stats, "stats", filled, kFirstEdgesStatsSize);
     return MAQ_OK;
   });

@@ -16,6 +16,7 @@ constexpr double kMinKnown = 0.9;
 constexpr double kFloor_r = 0.1, kNoiseFactor = 1.2;
 // From the mean absolute second difference to the standard deviation, of white Gaussian noise.
 constexpr double kDeviationOfBends = 0.51166;  // sqrt(pi / 2) / sqrt(6)
+constexpr int kWindowMargin_px = 16 + 16;      // eps_r, of surfaces that face the camera; and context
 
 // Sums over rows of a tile, in columns: their order is the same however wide vectors are.
 struct Columns {
@@ -42,6 +43,14 @@ MAQ_SIMD_CLONES void add_row(const float* __restrict depth, double y, Columns& _
     sums.bends[x] += double(all_known * std::abs(inverse[x] - inverse[x + 1] + (inverse[x + 2] - inverse[x + 1])));
     sums.bend_count[x] += double(all_known);
   }
+}
+
+// A half of `whole`, or all of it, that holds [begin, end) and its surroundings; it may end behind `whole`.
+std::pair<int, int> part_of(int begin, int end, int whole, int multiple) {
+  begin = std::max(0, begin - kWindowMargin_px) / multiple * multiple;
+  const int half = round_up(divide_up(whole, 2), multiple), padded = round_up(whole, multiple);
+  if (std::min(end + kWindowMargin_px, whole) - begin > half) return {0, padded};
+  return {std::min(begin, padded - half), half};
 }
 
 }  // namespace
@@ -121,16 +130,22 @@ FieldWindow ActiveWindow::find(const DepthPlane& depth, const Intrinsics& intrin
   threads.run(size_t(rows_), [&](size_t row, int) { sum_row_of_tiles(depth, int(row)); });
 
   const double focal_px = std::sqrt(intrinsics.fx_px * intrinsics.fy_px);
-  FieldBounds bounds(depth.width_px, depth.height_px);
+  int left = depth.width_px, right = 0, top = depth.height_px, bottom = 0;
   for (int row = 0; row < std::max(1, rows_ - 1); ++row) {
     for (int column = 0; column < std::max(1, columns_ - 1); ++column) {
       const int x = column * kTile_px, y = row * kTile_px;
       const int end_x = std::min(x + 2 * kTile_px, depth.width_px), end_y = std::min(y + 2 * kTile_px, depth.height_px);
       if (!has_edge(column, row, focal_px, int64_t(end_x - x) * (end_y - y))) continue;
-      bounds.add(x, y, end_x, end_y);
+      left = std::min(left, x);
+      right = std::max(right, end_x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, end_y);
     }
   }
-  return window_around(bounds, depth.width_px, depth.height_px, multiple_px);
+  if (right == 0) return {};
+  const auto [x, width] = part_of(left, right, depth.width_px, multiple_px);
+  const auto [y, height] = part_of(top, bottom, depth.height_px, multiple_px);
+  return {x, y, width, height};
 }
 
 }  // namespace maq

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/worker_threads.h"
-#include "edges/field_window.h"
 #include "image/geometry/intrinsics.h"
 
 namespace maq {
@@ -16,6 +15,12 @@ namespace maq {
 struct DepthPlane {
   const float* metres = nullptr;
   int width_px = 0, height_px = 0;
+};
+
+// A part of a frame, which may reach beyond its right and lower border by less than what it has of the frame. No width:
+// none.
+struct FieldWindow {
+  int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
 };
 
 class DepthSlopes {

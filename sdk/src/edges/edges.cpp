@@ -54,8 +54,7 @@ Edges::Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, c
       network_(runtime, std::move(bundle), session_settings(*runtime, settings)),
       cancel_(runtime),
       threads_(network_.threads()),
-      resting_(settings.average_frames),
-      kept_(settings.keep_frames) {}
+      resting_(settings.average_frames) {}
 
 void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result) {
   check_input(depth, intrinsics);
@@ -107,7 +106,7 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
 
   const DepthPlane plane{field.depth_m.data(), field.width, field.height};
   const FieldWindow window = network_window(field, stats.known_pixels > 0);
-  if (skips_planes_ || kept_.is_on()) stats.skip_ms = float(stage.lap_ms());
+  if (skips_planes_) stats.skip_ms = float(stage.lap_ms());
   clear_outside(window, field);
   if (window.width_px > 0) {
     slopes_.make(plane, field.intrinsics, window, threads_, network_.input(window.width_px, window.height_px));
@@ -117,7 +116,6 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
     stats.network_ms = float(stage.lap_ms());
     stats.broken_pixels = decode_.write(planes, window, threads_, field);
   }
-  if (kept_.is_on()) stats.kept_pixels = kept_.merge(field, threads_);
   stats.decode_ms = float(stage.lap_ms());
   stats.provider = network_.provider();
   stats.threads = network_.threads();
@@ -125,20 +123,12 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   stats.total_ms = float(total.elapsed_ms());
 }
 
-// Where the network must run. Both savings give a half or all of each side; each holds all that it wants to be found
-// anew, and what the network finds beyond is not used, so that the smaller one does where both are on.
+// Where the network must run.
 FieldWindow Edges::network_window(const EdgeField& field, bool is_known) {
-  const DepthPlane plane{field.depth_m.data(), field.width, field.height};
-  const int multiple = network_.multiple_px();
-  FieldWindow window{0, 0, round_up(field.width, multiple), round_up(field.height, multiple)};
-  if (kept_.is_on()) window = kept_.find(plane, field.intrinsics, multiple, threads_);
   if (!is_known) return {};
-  if (skips_planes_ && window.width_px > 0) {
-    const FieldWindow active = active_.find(plane, field.intrinsics, multiple, threads_);
-    if (!overlap(window, active)) return {};
-    if (active.width_px * active.height_px < window.width_px * window.height_px) window = active;
-  }
-  return window;
+  const int multiple = network_.multiple_px();
+  if (!skips_planes_) return {0, 0, round_up(field.width, multiple), round_up(field.height, multiple)};
+  return active_.find({field.depth_m.data(), field.width, field.height}, field.intrinsics, multiple, threads_);
 }
 
 }  // namespace maq

@@ -10,8 +10,6 @@
 #include "edges/edge_field.h"
 #include "edges/edge_network.h"
 #include "edges/field_decode.h"
-#include "edges/field_window.h"
-#include "edges/kept_field.h"
 #include "edges/resting_depth.h"
 #include "maquette/source.h"
 
@@ -24,7 +22,6 @@ struct EdgesSettings {
   maq_provider provider = MAQ_PROVIDER_CPU;
   bool skips_planes = false;
   int average_frames = 1;
-  int keep_frames = 1;
 };
 
 struct EdgesStats {
@@ -38,7 +35,6 @@ struct EdgesStats {
   int64_t network_pixels = 0;   // that it was run on
   int64_t broken_pixels = 0;    // for which it gave no number
   int64_t averaged_pixels = 0;  // whose depth is the mean of several frames
-  int64_t kept_pixels = 0;      // whose field is that of an earlier frame
   maq_provider provider = MAQ_PROVIDER_CPU;
   int threads = 1;
   bool is_threads_measured = false;
@@ -82,7 +78,6 @@ class Edges {
   WorkerThreads threads_;
   RestingDepth resting_;
   ActiveWindow active_;
-  KeptField kept_;
   DepthSlopes slopes_;
   FieldDecode decode_;
 };

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/worker_threads.h"
-#include "edges/area_motion.h"
 #include "image/geometry/intrinsics.h"
 
 namespace maq {
@@ -27,13 +26,15 @@ class RestingDepth {
   int64_t add(float* metres, const Intrinsics& camera, WorkerThreads& threads);
 
  private:
+  struct Area;
+
   int64_t add_row_of_areas(float* metres, int row);
-  int64_t add_area(float* metres, const PixelArea& area);
+  int64_t add_area(float* metres, const Area& area);
 
   int frames_;
   Intrinsics camera_{};
-  std::vector<float> inverse_;  // means, 1 / metres; 0: none yet
-  std::vector<uint8_t> count_;  // frames in each
+  std::vector<float> inverse_;  // means, 1 / metres
+  std::vector<uint8_t> count_;  // frames in each, 0: none yet
   std::vector<int64_t> averaged_;
 };
 

@@ -32,7 +32,6 @@ struct EdgesOptions {
   bool json = false;
   bool skip_planes = false;
   int average = 0;
-  int keep = 0;
   FrameLimits limits;
 };
 
@@ -108,7 +107,6 @@ void print_frame(const EdgesOptions& options, const std::string& stem, const maq
                                  {"network_pixels", stats.network_pixel_count},
                                  {"broken_pixels", stats.broken_pixel_count},
                                  {"averaged_pixels", stats.averaged_pixel_count},
-                                 {"kept_pixels", stats.kept_pixel_count},
                                  {"provider", name_of(stats.provider)},
                                  {"threads", stats.threads},
                                  {"threads_measured", stats.is_threads_measured != 0},
@@ -180,7 +178,6 @@ int run_edges(const EdgesOptions& options) {
     config.allow_spinning = options.network.no_spin ? 0 : 1;
     config.skip_planes = options.skip_planes ? 1 : 0;
     config.average_frames = options.average;
-    config.keep_frames = options.keep;
     config.provider = provider_of(options.network);
     edges = std::make_unique<maquette::Edges>(context, config);
   };
@@ -218,11 +215,6 @@ void add_edges_command(CLI::App& app, int* exit_code) {
   command
       ->add_option("--average", options->average,
                    "Take the mean of so many frames where nothing moves, 2 to 64: of a camera at rest, less noise")
-      ->check(CLI::Range(2, 64));
-  command
-      ->add_option(
-          "--keep", options->keep,
-          "Keep the field for so many frames where depth does not change, 2 to 64: of a camera at rest, faster")
       ->check(CLI::Range(2, 64));
   add_frame_limits(*command, options->limits);
   command->footer(

@@ -142,9 +142,6 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
     config = maquette::default_edges_config();
     config.average_frames = frames;
     refused(config, "config.average_frames");
-    config = maquette::default_edges_config();
-    config.keep_frames = frames;
-    refused(config, "config.keep_frames");
   }
   config = maquette::default_edges_config();
   reinterpret_cast<int32_t&>(config.provider) = 9;
@@ -185,24 +182,6 @@ TEST_F(ApiEdges, FramesAtRestAreAveragedWhenAskedFor) {
     edges_at_rest.run(frame, image.intrinsics);
     const maq_edges_stats stats = edges_at_rest.run(frame, image.intrinsics).stats();
     EXPECT_EQ(stats.averaged_pixel_count, frames == 4 ? stats.known_pixel_count : 0);
-  }
-}
-
-TEST_F(ApiEdges, TheFieldOfDepthThatDoesNotChangeIsKeptWhenAskedFor) {
-  maq_edges_config config = maquette::default_edges_config();
-  config.bundle_path = kEdgesBundle;
-  const int64_t pixels = int64_t(image.pixels.size());
-  for (const int32_t frames : {0, 1, 2, 3}) {
-    config.keep_frames = frames;
-    maquette::Edges keeping(context, config);
-    const maquette::EdgesResult first = keeping.run(frame, image.intrinsics);
-    for (int k = 1; k < 5; ++k) {
-      const maquette::EdgesResult next = keeping.run(frame, image.intrinsics);
-      const bool is_kept = frames > 1 && k % frames != 0;
-      EXPECT_EQ(next.stats().kept_pixel_count, is_kept ? pixels : 0) << frames << ", " << k;
-      EXPECT_EQ(next.stats().network_pixel_count > 0, !is_kept);
-      EXPECT_EQ(std::memcmp(next.distance_r(), first.distance_r(), image.pixels.size() * sizeof(float)), 0);
-    }
   }
 }
 

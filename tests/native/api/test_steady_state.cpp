@@ -160,12 +160,10 @@ TEST(SteadyState, FramesInTheFormatsOfCamerasTakeNothingFromTheHeap) {
 TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
   const maquette::Context context;
   for (const int32_t skip_planes : {0, 1}) {
-    // Kept areas, too, in the second round.
     maq_edges_config config = maquette::default_edges_config();
     config.bundle_path = MAQ_TEST_DATA "/tiny_edges/bundle";
     config.skip_planes = skip_planes;
     config.average_frames = 8;
-    config.keep_frames = skip_planes == 1 ? 4 : 0;
     maquette::Edges edges(context, config);
     maquette::Source source(context, "stub:solids?scene=box&noise=tof");
     const maq_intrinsics intrinsics = *source.intrinsics();

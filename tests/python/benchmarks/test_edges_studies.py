@@ -1,4 +1,4 @@
-"""Parts of the benchmark of edges beside its errors: Voronoi covariance, kept fields, parameters of curves."""
+"""Parts of the benchmark of edges beside its errors: Voronoi covariance, parameters of curves."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import maquette
 import numpy as np
 import pytest
 
-from benchmarks.edges import kept, quality, section, sensitivity, voronoi
+from benchmarks.edges import quality, section, sensitivity, voronoi
 from benchmarks.edges.measure import BUNDLE
 from benchmarks.edges.rivals import tuned
 from export.evaluation.edges_api import Edges, Pinhole
@@ -57,28 +57,6 @@ def test_voronoi_covariance_finds_a_ridge():
     found = tuned(voronoi.VORONOI, [depth], [FOCAL_PX], [distance], [counts]).run(depth, FOCAL_PX)[0]
     error = np.sqrt(np.mean((found - distance)[counts] ** 2))
     assert error < 0.5 * np.sqrt(np.mean((16 - distance)[counts] ** 2))
-
-
-@needs_library
-def test_a_scene_at_rest_differs_by_noise_and_by_the_plate_alone():
-    size = (160, 120)
-    exact = [depth for depth, _ in kept.frames_at_rest("shelf", "none", size, 3, False)]
-    assert np.array_equal(exact[0], exact[2])
-    moved = [depth for depth, _ in kept.frames_at_rest("shelf", "none", size, 3, True)]
-    changed = moved[0] != moved[2]
-    assert changed.any()
-    assert not changed[:, 80:].any()
-    noisy = [depth for depth, _ in kept.frames_at_rest("shelf", "tof", size, 2, False)]
-    assert (noisy[0] != noisy[1]).mean() > 0.5
-
-
-@needs_library
-def test_a_kept_field_of_exact_depth_is_that_without():
-    rows = kept.measure_savings(BUNDLE, 1, (160, 120), 3, scenes=("box",), noises=("none",))
-    still, moving = rows
-    assert (still["network_fraction"], still["difference_r"], still["other_side"]) == (0, 0, 0)
-    assert moving["network_fraction"] > 0
-    assert section.saving_rows(rows)[1][0].startswith("one box, none, field kept for 8 frames, at rest")
 
 
 @needs_library

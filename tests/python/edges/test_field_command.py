@@ -87,7 +87,7 @@ def test_planes_are_skipped_when_asked_for(bundle, tmp_path):
     assert (found == EPS_R).all()
 
 
-def test_frames_of_a_camera_at_rest_are_averaged_or_keep_their_field_when_asked_for(bundle, tmp_path):
+def test_frames_of_a_camera_at_rest_are_averaged_when_asked_for(bundle, tmp_path):
     rng = np.random.default_rng(4)
     folder = tmp_path / "frames"
     folder.mkdir()
@@ -102,9 +102,6 @@ def test_frames_of_a_camera_at_rest_are_averaged_or_keep_their_field_when_asked_
     for options in ((), ("--average", "8")):
         run = subprocess.run([*command, *options], capture_output=True, text=True, check=True)
         counts[options] = [json.loads(line)["averaged_pixels"] for line in run.stdout.splitlines()]
-    run = subprocess.run([*command, "--keep", "5"], capture_output=True, text=True, check=True)
-    kept = [json.loads(line)["kept_pixels"] for line in run.stdout.splitlines()]
-    assert kept == [0, *[depth.size] * 4, 0, depth.size, depth.size]
     assert counts[()] == [0] * 8
     alone, *rest = counts["--average", "8"]
     assert alone == 0

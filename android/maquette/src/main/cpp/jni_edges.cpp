@@ -20,7 +20,7 @@ MAQ_NATIVE_OF(NativeEdges, jlong, create)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, 7);
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 6);
     maq_edges_config config;
     check(maq_edges_config_init(&config, sizeof config));
     bundle.put_into(config);
@@ -30,7 +30,6 @@ MAQ_NATIVE_OF(NativeEdges, jlong, create)
     config.provider = maq_provider(int32_t(from[3]));
     config.skip_planes = int32_t(from[4]);
     config.average_frames = int32_t(from[5]);
-    config.keep_frames = int32_t(from[6]);
     maq_edges* edges = nullptr;
     check(maq_edges_create(object<maq_context>(context), &config, &edges));
     return handle(edges);
@@ -99,7 +98,7 @@ MAQ_NATIVE_OF(NativeEdges, jdoubleArray, statsOfResult)(JNIEnv* env, jclass, jlo
     return maq_jni::doubles_of(
         env, {s.depth_ms, s.skip_ms, s.slopes_ms, s.network_ms, s.decode_ms, s.total_ms, double(s.known_pixel_count),
               double(s.network_pixel_count), double(s.broken_pixel_count), double(s.provider), double(s.threads),
-              double(s.is_threads_measured), double(s.averaged_pixel_count), double(s.kept_pixel_count)});
+              double(s.is_threads_measured), double(s.averaged_pixel_count)});
   });
 }
 

@@ -25,8 +25,6 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
      *   noise: faster, and may miss flat creases in noise.
      * @property averageFrames 2 to 64: depth is the mean over so many frames of a camera at rest, which takes noise away;
      *   what moves begins anew. 0: each frame is on its own.
-     * @property keepFrames 2 to 64: areas of 32 x 32 px whose depth does not change keep their field for so many frames,
-     *   which is faster. 0: each frame's field is its own.
      */
     data class Config(
         val threads: Int = 0,
@@ -35,7 +33,6 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
         val provider: DensePose.Provider = DensePose.Provider.CPU,
         val skipPlanes: Boolean = false,
         val averageFrames: Int = 0,
-        val keepFrames: Int = 0,
     ) {
         internal fun values() =
             doubleArrayOf(
@@ -45,7 +42,6 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
                 provider.ordinal.toDouble(),
                 if (skipPlanes) 1.0 else 0.0,
                 averageFrames.toDouble(),
-                keepFrames.toDouble(),
             )
     }
 
@@ -112,7 +108,6 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
         val threads: Int,
         val isThreadsMeasured: Boolean,
         val averagedPixels: Long,
-        val keptPixels: Long,
     )
 
     /** Where distances end, in footprints. */
@@ -166,7 +161,7 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
             return Stats(
                 s[0], s[1], s[2], s[3], s[4], s[5], s[6].toLong(), s[7].toLong(), s[8].toLong(),
                 DensePose.Provider.entries[s[9].toInt()], s[10].toInt(), s[11] != 0.0,
-                s[12].toLong(), s[13].toLong(),
+                s[12].toLong(),
             )
         }
 

@@ -237,7 +237,7 @@ def section(measured: dict) -> tuple[str, list]:
         f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
         f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
     )
-    if measured["gaps"]:
+    if measured.get("gaps"):  # a report measured before has none
         parts.append(
             "Gaps of up to 300 ms bridged, PSNR in dB over their frames: the last frame repeated / what is predicted."
         )

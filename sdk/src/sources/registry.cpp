@@ -150,7 +150,7 @@ std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const Sour
 }
 
 // The file of `uri`, with its options.
-std::unique_ptr<Source> open_file(SourceUri uri, const SourceSettings& settings) {
+std::unique_ptr<Source> open_file_source(SourceUri uri, const SourceSettings& settings) {
   uri.scheme = scheme_of_file(uri.target);
   const Entry& entry = *find_entry(uri.scheme);
   return open_entry(entry, std::move(uri), settings);
@@ -176,7 +176,7 @@ std::unique_ptr<Source> open_path(const std::string& path, const SourceSettings&
     throw Error(MAQ_ERROR_NOT_FOUND, path,
                 " does not exist; check the path, or write scheme:target, as in stub:people or camera:.");
   }
-  return open_file(std::move(uri), settings);
+  return open_file_source(std::move(uri), settings);
 }
 
 // With the options of `uri`.
@@ -241,7 +241,7 @@ std::unique_ptr<Source> open_source(const std::string& text, const SourceSetting
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", text, "\" names nothing after ", uri.scheme, ":, as in ",
                 entry->scheme.example, ".");
   }
-  if (uri.scheme == kFile) return open_file(std::move(uri), settings);
+  if (uri.scheme == kFile) return open_file_source(std::move(uri), settings);
   if (uri.scheme == kCamera) return open_first_camera(uri, settings);
   return open_entry(*entry, std::move(uri), settings);
 }

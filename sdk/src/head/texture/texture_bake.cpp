@@ -131,7 +131,8 @@ void take_colours(const TextureImage& from, int side, Texels& texels) {
   const double scale = double(from.side_px) / double(side);
   for (size_t i = 0; i < texels.is_surface.size(); ++i) {
     if (texels.is_surface[i] == 0) continue;
-    const double x = (double(i % size_t(side)) + 0.5) * scale - 0.5, y = (double(i / size_t(side)) + 0.5) * scale - 0.5;
+    const size_t row = i / size_t(side), column = i % size_t(side);
+    const double x = (double(column) + 0.5) * scale - 0.5, y = (double(row) + 0.5) * scale - 0.5;
     const auto bgr = between_pixels<uint8_t, 3>(from.bgr, from.side_px, from.side_px, x, y);
     for (size_t c = 0; c < 3; ++c) texels.colours[3 * i + c] = float(bgr[2 - c]);
   }

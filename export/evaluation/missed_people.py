@@ -38,7 +38,7 @@ ROWS = {
 }
 SCORE_FLOOR = 0.05
 SHIFT = 0.1  # of a side, at most
-MIN_IOU = 0.3  # a box that overlaps nobody by more is nobody's
+MIN_IOU = 0.3  # min overlap of a box with the person that it belongs to; below, it belongs to no person
 
 
 class Truth:

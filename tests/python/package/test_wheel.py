@@ -70,9 +70,9 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
         assert f"maquette/{name}" in names
     assert not [name for name in names if "demo" in name or name.startswith("build")]
     # 17 MB until edges had a network of twice the size (0.4 MB) and the library prediction (0.07 MB); then the bundle
-    # of prediction came (2.4 MB, of which its table packs well), its transformer (5 MB) and larger networks of edges
+    # of prediction came (2.4 MB, of which its table packs well), its transformer (3 MB) and larger networks of edges
     # and heads (0.7 MB).
-    assert wheel.stat().st_size < 25.5e6
+    assert wheel.stat().st_size < 23.5e6
 
 
 def test_the_wheel_is_not_built_without_the_library(tmp_path):

@@ -138,7 +138,8 @@ def main() -> None:
     if (options.fp32 / f"{EXPECTED}.onnx").exists():
         quantize_expected(options.fp32, options.out)
     if (options.fp32 / TRANSFORMER).exists():
-        quantize_transformer(options.fp32, options.out)
+        calibrating = read_codes(options.codes, "train")
+        quantize_transformer(options.fp32, options.out, calibrating, settings.frames)
         clips = read_codes(options.codes, "val")
         by_transformer = transformer_cost(options.fp32, options.out, clips, settings.held_out_frames)
         print(", ".join(f"{name} {value}" for name, value in by_transformer.items()))

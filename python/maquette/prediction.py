@@ -3,6 +3,7 @@ bridged."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -45,6 +46,32 @@ class Predictor(NativeObject):
             "maq_frame", self.handle, ahead_s, function="maq_predictor_predict", release="maq_frame_release"
         )
         return Frame.of_handle(made)
+
+    def draw(self, samples: int, frames: int, step_s: float) -> None:
+        """Draws `samples` (1 to 16) of what the stream may show, each `frames` (1 to 64) frames, `step_s` (to 0.1)
+        apart: of method "network", network_mode=3 (MAQ_NETWORK_DRAWN), by its temperature, top_k, seed and passes. A
+        sample is the same however many others are drawn. Until the next push, prediction or draw `drawn` and
+        `uncertainty` give what was drawn. Raises MaquetteError."""
+        native().call("maq_predictor_draw", self.handle, samples, frames, step_s)
+
+    def drawn(self, sample: int, number: int) -> Frame:
+        """The picture of frame `number`, from 1, of a sample, from 0. Hold at most four at once (frame_pool_size).
+        Raises MaquetteError for one that was not drawn."""
+        made = native().create(
+            "maq_frame", self.handle, sample, number,
+            function="maq_predictor_acquire_drawn", release="maq_frame_release",
+        )  # fmt: skip
+        return Frame.of_handle(made)
+
+    def uncertainty(self, sample: int, number: int) -> np.ndarray:
+        """How uncertain that frame was when it was drawn: the entropy of a code in bits, float32 [16, 16], a cell for
+        each part of the frame. Raises MaquetteError for one that was not drawn."""
+        n = native()
+        bits = np.zeros(int(self.stats["cell_count"]), np.float32)
+        into = n.ffi.from_buffer("float[]", bits)
+        n.call("maq_predictor_copy_uncertainty", self.handle, sample, number, into, bits.size)
+        side = math.isqrt(bits.size)
+        return bits.reshape(side, side)
 
     def reset(self) -> None:
         """Forgets the frames so far, as before another stream."""

@@ -46,6 +46,9 @@ typedef struct maq_predictor_config {
       temperature; /* of codes that are drawn: 0 (default) takes the likeliest of each; 1 draws by the probabilities */
   uint32_t top_k;  /* only so many of the likeliest; 0 (default): all */
   uint64_t seed;   /* equal seeds draw equal frames, on one processor; default 0 */
+  uint32_t passes; /* of codes that are drawn: 0 (default) draws one after another, exactly by the probabilities; 1 to
+                      16 all of a frame at once, at most so many times, each time after those of the time before:
+                      quicker, and the same where that settles */
 } maq_predictor_config;
 
 /* Times of the latest push and prediction, in wall-clock milliseconds, and counts since the predictor was made. */
@@ -66,7 +69,9 @@ typedef struct maq_predictor_stats {
   uint64_t reset_count; /* frames that did not go on from the one before, so that it was forgotten */
   /* MAQ_PREDICTION_NETWORK; all else is of what AUTO has: */
   float networks_ms;    /* of the latest push or prediction; 0 where nothing moved, so that none ran */
-  uint32_t drawn_count; /* frames drawn for the latest prediction */
+  uint32_t drawn_count; /* frames drawn for the latest prediction or maq_predictor_draw */
+  uint32_t cell_count;  /* of maq_predictor_copy_uncertainty: 256, 16 rows of 16 in the bundles of this SDK; 0 without
+                           networks */
 } maq_predictor_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_predictor_config) of the caller.
@@ -99,6 +104,30 @@ MAQ_API maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame*
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_POOL_EMPTY,
  * MAQ_ERROR_INFERENCE. Blocks while pixels are computed, and networks run. */
 MAQ_API maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_frame** frame);
+
+/* Draws `sample_count` (1 to 16) of what the stream may show, each `frame_count` (1 to 64) frames, `step_s` apart:
+ * above 0, at most 0.1, and 10 in all. Of a predictor with MAQ_PREDICTION_NETWORK that draws codes, by its temperature,
+ * top_k, seed and passes. A sample goes on from its own frames, and is the same however many others and frames are
+ * drawn; the same call after the same frames draws the same. While nothing moves all of them are the last frame. They
+ * are known until the next push, prediction, draw or reset. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also
+ * before the first frame), MAQ_ERROR_UNSUPPORTED (a predictor that does not draw), MAQ_ERROR_INFERENCE. Blocks while
+ * networks run: a frame of a sample takes as long as maq_predictor_predict does with them, of more samples at once
+ * less. */
+MAQ_API maq_status maq_predictor_draw(maq_predictor* predictor, uint32_t sample_count, uint32_t frame_count,
+                                      double step_s);
+
+/* Makes the picture of frame `number`, from 1, of a sample that was drawn, from 0; all else as maq_predictor_predict
+ * has it for that time. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also where it is not known),
+ * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE. Blocks while pixels are computed, and networks run. */
+MAQ_API maq_status maq_predictor_acquire_drawn(maq_predictor* predictor, uint32_t sample, uint32_t number,
+                                               maq_frame** frame);
+
+/* Writes how uncertain that frame was when it was drawn, after those before it in its sample: the entropy of a code in
+ * bits, mean of each cell, stats.cell_count floats row by row from the top left; 0 where nothing moved. A cell is that
+ * part of the frame, whatever the frame's shape. `count` is how many have room there.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little room; also where it is not known). Does not block. */
+MAQ_API maq_status maq_predictor_copy_uncertainty(const maq_predictor* predictor, uint32_t sample, uint32_t number,
+                                                  float* bits, size_t count);
 
 /* Forgets the frames so far, as before another stream.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

@@ -38,6 +38,23 @@ class Predictor {
     return Frame(made);
   }
 
+  // maq_predictor_draw; then frame `number`, from 1, of each sample, from 0, and its uncertainty by cell.
+  void draw(uint32_t sample_count, uint32_t frame_count, double step_s) {
+    check(maq_predictor_draw(get(), sample_count, frame_count, step_s));
+  }
+
+  Frame drawn(uint32_t sample, uint32_t number) {
+    maq_frame* made = nullptr;
+    check(maq_predictor_acquire_drawn(get(), sample, number, &made));
+    return Frame(made);
+  }
+
+  std::vector<float> uncertainty(uint32_t sample, uint32_t number) const {
+    std::vector<float> bits(stats().cell_count);
+    check(maq_predictor_copy_uncertainty(get(), sample, number, bits.data(), bits.size()));
+    return bits;
+  }
+
   void reset() { check(maq_predictor_reset(get())); }
 
   maq_predictor_stats stats() const {

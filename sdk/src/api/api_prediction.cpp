@@ -89,6 +89,8 @@ std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const m
   switch (mode) {
     case MAQ_NETWORK_DRAWN: {
       const CodeSampler checked(settings.sampling, bundle.codes->entries);
+      require_range("config.passes", config.passes, 0u, uint32_t(CodeTransformer::kMaxPasses));
+      settings.passes = config.passes;
       settings.mode = NetworkMode::kDrawn;
       networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
       break;
@@ -102,6 +104,13 @@ std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const m
       networks.mended = std::make_shared<MendedPicture>(state.onnxruntime(), bundle, session);
   }
   return std::make_unique<NetworkPredictor>(std::move(networks), settings, threads);
+}
+
+NetworkPredictor& drawing(const maq_predictor* predictor) {
+  if (predictor->by_network == nullptr) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "This predictor draws no samples; make one whose method is by networks.");
+  }
+  return *predictor->by_network;
 }
 
 }  // namespace
@@ -153,6 +162,39 @@ maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_f
   });
 }
 
+maq_status maq_predictor_draw(maq_predictor* predictor, uint32_t sample_count, uint32_t frame_count, double step_s) {
+  return guarded_alone(predictor, "predictor", __func__, [&] {
+    require_range("sample_count", sample_count, 1u, uint32_t(CodeTransformer::kMaxSamples));
+    require_range("frame_count", frame_count, 1u, uint32_t(NetworkPredictor::kMaxDrawn));
+    require_range("step_s", step_s, 1e-6, double(NetworkPredictor::kLongestStep_ns) / 1e9);
+    drawing(predictor).draw(sample_count, frame_count, std::llround(step_s * 1e9));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_predictor_acquire_drawn(maq_predictor* predictor, uint32_t sample, uint32_t number, maq_frame** frame) {
+  return guarded_alone(predictor, "predictor", __func__, [&] {
+    require_argument(frame, "frame");
+    BoundedPool<maq_frame>::Pooled handle = predictor->frames.acquire();
+    drawing(predictor).drawn_picture(sample, number, handle->frame);
+    *frame = lend<maq_frame>(std::move(handle));
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_predictor_copy_uncertainty(const maq_predictor* predictor, uint32_t sample, uint32_t number, float* bits,
+                                          size_t count) {
+  return guarded_alone(predictor, "predictor", __func__, [&] {
+    require_argument(bits, "bits");
+    const NetworkPredictor& by_network = drawing(predictor);
+    if (count < by_network.places()) {
+      throw ArgumentError("bits has room for ", count, " cells, but ", by_network.places(), " are written.");
+    }
+    by_network.drawn_entropy(sample, number, bits);
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_predictor_reset(maq_predictor* predictor) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
     predictor->by_network ? predictor->by_network->reset() : predictor->predictor->reset();
@@ -169,7 +211,8 @@ maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor
         maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
                             from.predict_ms, from.method, from.motion_fraction, from.pushed, from.predicted,
                             from.resets, by_network != nullptr ? by_network->networks_ms() : 0.0f,
-                            by_network != nullptr ? uint32_t(by_network->steps()) : 0u},
+                            by_network != nullptr ? uint32_t(by_network->steps()) : 0u,
+                            by_network != nullptr ? uint32_t(by_network->places()) : 0u},
         sizeof(maq_predictor_stats));
     return MAQ_OK;
   });

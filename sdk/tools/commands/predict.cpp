@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <filesystem>
 #include <map>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -14,18 +13,18 @@
 #include <string>
 #include <vector>
 
+#include "arguments/bundle_argument.h"
 #include "arguments/source_argument.h"
 #include "commands/commands.h"
 #include "commands/predict_surprise.h"
 #include "interrupt.h"
+#include "output/drawn_samples.h"
 #include "output/frame_image.h"
-#include "output/output_file.h"
+#include "output/predicted_pictures.h"
 #include "output/prediction_mark.h"
 #include "output/progress_bar.h"
 #include "print.h"
 #include "program.h"
-
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -38,6 +37,7 @@ struct PredictOptions {
   bool json = false;
   int threads = 0;
   std::string out;
+  SampleOptions drawn;
 };
 
 constexpr int64_t kDefaultFrom = 30;
@@ -63,54 +63,8 @@ struct Ahead {
   maq_prediction_method method = MAQ_PREDICTION_LAST;  // that made it; auto: both
   double motion_fraction = 0, predict_ms = 0;
   std::optional<double> last_db, motion_db, chosen_db;
-};
-
-// Where the pictures go: a clip, or a folder of PNG files.
-class PredictedPictures {
- public:
-  PredictedPictures(const maquette::Context& context, const std::string& out, const std::string& stem, double fps)
-      : context_(context), out_(out), stem_(stem) {
-    if (out.empty()) return;
-    const std::string extension = out_.extension().string();
-    if (extension == ".mp4" || extension == ".avi") {
-      make_folder_of(out_);
-      clip_.emplace(context, out, fps > 0 ? fps : 10);
-    } else if (!extension.empty() && !fs::is_directory(out_)) {
-      throw std::runtime_error(out + " ends in " + extension +
-                               "; give a clip (.mp4 or .avi), or a folder for PNG files.");
-    }
-  }
-
-  bool is_clip() const { return clip_.has_value(); }
-  void add_to_clip(const cv::Mat& picture) {
-    clip_->add(frame_of(context_, picture));
-    ++count_;
-  }
-  // The frame itself, with the mark in the file; or the pictures drawn side by side.
-  void save(int64_t number, const maquette::Frame& frame, const cv::Mat* compared) {
-    char name[64];
-    std::snprintf(name, sizeof name, "_ahead_%03lld.png", (long long)number);
-    const fs::path path = out_ / (stem_ + name);
-    make_folder_of(path);
-    if (compared != nullptr) {
-      frame_of(context_, *compared).save(path.string());
-    } else {
-      frame.save(path.string());
-    }
-    ++count_;
-  }
-  // "": nothing was asked for.
-  std::string finish() {
-    if (clip_) clip_->finish();
-    return count_ > 0 ? out_.string() : "";
-  }
-
- private:
-  const maquette::Context& context_;
-  const fs::path out_;
-  const std::string stem_;
-  std::optional<maquette::Clip> clip_;
-  int64_t count_ = 0;
+  std::vector<double> samples_db;
+  double uncertain_bits = 0;  // of a code of the samples
 };
 
 maquette::Predictor make_predictor(const maquette::Context& context, const PredictOptions& options,
@@ -163,7 +117,9 @@ void print_results(const PredictOptions& options, const std::string& stem, uint6
                                       {"predict_ms", rounded_ms(ahead.predict_ms)}};
       if (ahead.last_db) {
         frame["psnr_db"] = {{"last", *ahead.last_db}, {"motion", *ahead.motion_db}, {"chosen", *ahead.chosen_db}};
+        if (options.drawn.samples > 0) frame["psnr_db"]["samples"] = ahead.samples_db;
       }
+      if (options.drawn.samples > 0) frame["uncertainty_bits"] = ahead.uncertain_bits;
       document["frames"].push_back(frame);
     }
     if (!written.empty()) document["out"] = written;
@@ -179,6 +135,10 @@ void print_results(const PredictOptions& options, const std::string& stem, uint6
     }
     print_output("%6.0f ms  %7.2f dB  %7.2f dB  %7.2f dB  %s\n", 1e3 * ahead.ahead_s, *ahead.last_db, *ahead.motion_db,
                  *ahead.chosen_db, fraction_of_motion(ahead).c_str());
+    if (!ahead.samples_db.empty()) {
+      const auto [worst, best] = std::minmax_element(ahead.samples_db.begin(), ahead.samples_db.end());
+      print_output("           samples %.2f to %.2f dB, %.2f bits a code\n", *worst, *best, ahead.uncertain_bits);
+    }
   }
   if (!written.empty()) print_output("%s  %zu predicted frames -> %s\n", stem.c_str(), found.size(), written.c_str());
 }
@@ -203,6 +163,8 @@ int predict(const PredictOptions& options) {
   maquette::Predictor predictor = make_predictor(context, options, options.method);
   std::optional<maquette::Predictor> motion;
   if (options.compare) motion = make_predictor(context, options, MAQ_PREDICTION_MOTION);
+  std::optional<DrawnSamples> samples;
+  if (options.drawn.samples > 0) samples.emplace(context, options.drawn, options.threads);
 
   ProgressBar progress(argument.stem, from + 1 + options.frames);
   std::deque<cv::Mat> before;  // the frames seen last, for the clip
@@ -216,6 +178,7 @@ int predict(const PredictOptions& options) {
     if (seen == 0) first = last;
     predictor.push(*frame);
     if (motion) motion->push(*frame);
+    if (samples) samples->push(*frame);
     before.push_back(image_of(*frame));
     if (before.size() > shown_before) before.pop_front();
     progress.advance(++seen, "seen");
@@ -230,11 +193,14 @@ int predict(const PredictOptions& options) {
   if (step_s == 0 && seen > 1) step_s = double(last.timestamp_ns - first.timestamp_ns) / 1e9 / double(seen - 1);
   if (!(step_s > 0)) step_s = 0.1;
 
+  if (samples) samples->draw(options.frames, step_s);
+  const bool is_row = options.compare || samples.has_value();
   if (pictures.is_clip()) {
-    const size_t columns = !options.compare ? 1 : options.method == MAQ_PREDICTION_AUTO ? 4 : 3;
+    const size_t compared = !options.compare ? 0 : options.method == MAQ_PREDICTION_AUTO ? 4 : 3;
+    const size_t columns = compared + (samples ? size_t(samples->count()) + 1 : 0);
     for (const cv::Mat& picture : before) {
       const std::vector<std::pair<std::string, cv::Mat>> row(columns, {"seen", picture});
-      pictures.add_to_clip(options.compare ? side_by_side(row) : picture);
+      pictures.add_to_clip(is_row ? side_by_side(row) : picture);
     }
   }
   std::vector<Ahead> found;
@@ -253,6 +219,7 @@ int predict(const PredictOptions& options) {
     ahead.motion_fraction = double(stats.motion_fraction);
     ahead.predict_ms = double(stats.predict_ms);
     cv::Mat picture = image_of(frame);
+    std::vector<std::pair<std::string, cv::Mat>> columns;
     if (options.compare) {
       const cv::Mat moved = image_of(motion->predict(ahead.ahead_s));
       const cv::Mat seen_then = has_truth ? image_of(*truth) : cv::Mat(picture.size(), picture.type(), cv::Scalar());
@@ -261,19 +228,38 @@ int predict(const PredictOptions& options) {
         ahead.motion_db = psnr_db(moved, seen_then);
         ahead.chosen_db = psnr_db(picture, seen_then);
       }
-      std::vector<std::pair<std::string, cv::Mat>> columns = {
-          {has_truth ? "truth" : "no truth", seen_then},
-          {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
-          {caption("motion", ahead.ahead_s, ahead.motion_db), moved}};
+      columns = {{has_truth ? "truth" : "no truth", seen_then},
+                 {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
+                 {caption("motion", ahead.ahead_s, ahead.motion_db), moved}};
       if (options.method == MAQ_PREDICTION_AUTO) {
         columns.emplace_back(caption("auto", ahead.ahead_s, ahead.chosen_db), picture);
       }
+    }
+    if (samples) {
+      const std::vector<float> bits = samples->uncertainty(i);
+      for (const float own : bits) ahead.uncertain_bits += double(own) / double(bits.size());
+      for (int sample = 0; sample < samples->count(); ++sample) {
+        const maquette::Frame drawn = samples->frame(sample, i);
+        cv::Mat shown = image_of(drawn);
+        std::optional<double> db;
+        if (has_truth) db = ahead.samples_db.emplace_back(psnr_db(shown, columns.front().second));
+        if (!options.compare && !options.out.empty() && !pictures.is_clip()) pictures.save(i, drawn, nullptr, sample);
+        draw_prediction_mark(drawn, shown);
+        columns.emplace_back(caption(("sample " + std::to_string(sample + 1)).c_str(), ahead.ahead_s, db), shown);
+      }
+      char text[64];
+      std::snprintf(text, sizeof text, "uncertain: %.2f bits", ahead.uncertain_bits);
+      columns.emplace_back(text, draw_uncertainty(bits, picture));
+    }
+    if (is_row && (options.compare || pictures.is_clip())) {
       const cv::Mat row = side_by_side(columns);
       if (pictures.is_clip()) {
         pictures.add_to_clip(row);
       } else if (!options.out.empty()) {
         pictures.save(i, frame, &row);
       }
+    } else if (is_row) {
+      // Each was saved.
     } else if (pictures.is_clip()) {
       draw_prediction_mark(frame, picture);
       pictures.add_to_clip(picture);
@@ -309,10 +295,9 @@ void add_predict_command(CLI::App& app, int* exit_code) {
   command->add_option("--max-frames", surprise->max_frames, "Stop after so many; default: at the end, or at Ctrl-C")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40))
       ->needs(flag);
-  command
-      ->add_option("--bundle", surprise->bundle,
-                   "Folder of the network; default: MAQ_PREDICTION_BUNDLE, then the one installed with this program")
-      ->needs(flag);
+  command->add_option("--bundle", surprise->bundle,
+                      "Folder of the networks of surprise and of samples; default: MAQ_PREDICTION_BUNDLE, then the one "
+                      "installed with this program");
   const auto for_pictures = [flag](CLI::Option* option) { option->excludes(flag); };
   for_pictures(command
                    ->add_option("--from", options->from,
@@ -331,6 +316,25 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "-c,--compare", options->compare,
       "Print the error (PSNR) of last and motion by time ahead, and draw truth and all of them side by "
       "side"));
+  CLI::Option* const samples =
+      command->add_option("--samples", options->drawn.samples,
+                          "Draw so many (1 to 16) of what may come by a network, and show how uncertain it is");
+  for_pictures(samples->check(CLI::Range(1, 16)));
+  command
+      ->add_option("--temperature", options->drawn.temperature,
+                   "Of samples: 1 (default) draws by the probabilities, 0 takes the likeliest")
+      ->check(CLI::NonNegativeNumber)
+      ->needs(samples);
+  command->add_option("--top-k", options->drawn.top_k, "Of samples: only so many of the likeliest; default: all")
+      ->check(CLI::Range(0u, 512u))
+      ->needs(samples);
+  command->add_option("--seed", options->drawn.seed, "Of samples: equal seeds draw the same; default: 0")
+      ->needs(samples);
+  command
+      ->add_option("--passes", options->drawn.passes,
+                   "Of samples: all places at once, so many times (1 to 16); default: exactly, one after another")
+      ->check(CLI::Range(1u, 16u))
+      ->needs(samples);
   command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
   command->add_option("-o,--out", options->out,
@@ -345,11 +349,13 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"
       "  maquette predict clip.mp4 --from 40 --compare            # the figures alone\n"
       "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
+      "  maquette predict clip.mp4 --samples 4 --temperature 0.7 --seed 3 --compare --out may.mp4\n"
       "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4\n"
       "  maquette predict camera: --surprise --events 6           # what stands out: cuts, a frozen or covered camera\n"
       "  maquette predict clip.mp4 --surprise --out surprise.mp4");
   command->callback([=] {
     if (!*is_surprise) {
+      options->drawn.bundle = surprise->bundle.empty() ? default_prediction_bundle() : surprise->bundle;
       *exit_code = predict(*options);
       return;
     }

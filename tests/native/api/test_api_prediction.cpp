@@ -1,6 +1,7 @@
 // Predictors through the C API: frames in and out, marks, statuses.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -119,6 +120,93 @@ TEST_F(ApiPrediction, NetworksThatABundleDoesNotHaveAndDrawsOutOfRangeAreRefused
     const int unknown = 4;
     std::memcpy(&config.network_mode, &unknown, sizeof unknown);
   });
+}
+
+TEST_F(ApiPrediction, SamplesAreMarkedFramesThatDependOnNoOther) {
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
+  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+  config.temperature = 1;
+  config.seed = 4;
+  maquette::Predictor predictor(context_, config);
+  config.threads = 2;
+  maquette::Predictor other(context_, config);
+  const auto first = source.next();
+  predictor.push(*first);
+  other.push(*first);
+  predictor.draw(2, 1, 0.1);
+  EXPECT_EQ(bytes_of(predictor.drawn(1, 1)), bytes_of(*first)) << "nothing is known to move";
+  EXPECT_EQ(predictor.uncertainty(1, 1), std::vector<float>(256, 0.0f));
+  while (const auto frame = source.next()) {
+    predictor.push(*frame);
+    other.push(*frame);
+  }
+  predictor.draw(3, 2, 0.1);
+  EXPECT_EQ(predictor.stats().drawn_count, 6u);
+  const maquette::Frame drawn = predictor.drawn(1, 2);
+  const std::vector<float> bits = predictor.uncertainty(1, 2);
+  EXPECT_EQ(drawn.desc().width_px, 320);
+  EXPECT_TRUE(drawn.is_predicted());
+  EXPECT_EQ(drawn.origin().horizon_ns, 200000000);
+  EXPECT_EQ(bits.size(), 256u);
+  EXPECT_GT(*std::max_element(bits.begin(), bits.end()), 0.5f);
+  EXPECT_LE(*std::max_element(bits.begin(), bits.end()), 4.0f) << "log2 of 16 entries";
+  EXPECT_NE(bytes_of(drawn), bytes_of(predictor.drawn(0, 2)));
+  EXPECT_NE(bytes_of(drawn), bytes_of(predictor.drawn(1, 1)));
+  for (maquette::Predictor* const again : {&predictor, &other}) {
+    again->draw(2, 3, 0.1);  // fewer samples, more frames, other threads
+    EXPECT_EQ(bytes_of(again->drawn(1, 2)), bytes_of(drawn));
+    EXPECT_EQ(again->uncertainty(1, 2), bits);
+  }
+  config.seed = 5;
+  maquette::Predictor another(context_, config);
+  maquette::Source same(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
+  while (const auto frame = same.next()) another.push(*frame);
+  another.draw(2, 2, 0.1);
+  EXPECT_NE(another.uncertainty(1, 2), bits);
+}
+
+TEST_F(ApiPrediction, WhatWasNotDrawnIsToldAndForgottenWithTheFrames) {
+  maquette::Predictor predictor(context_, network_config(MAQ_NETWORK_DRAWN)), automatic(context_),
+      expected(context_, network_config(MAQ_NETWORK_EXPECTED));
+  maq_frame* made = nullptr;
+  std::vector<float> bits(256);
+  const auto refused = [&](maq_status status, maq_status expected_status, const char* words) {
+    EXPECT_EQ(status, expected_status) << words;
+    EXPECT_NE(text().find(words), std::string::npos) << text();
+    EXPECT_EQ(made, nullptr);
+  };
+  constexpr maq_status kWrong = MAQ_ERROR_INVALID_ARGUMENT;
+  refused(maq_predictor_draw(predictor.get(), 1, 1, 0.1), kWrong, "No frame was pushed");
+  for (maquette::Predictor* const each : {&predictor, &automatic, &expected}) each->push(frame(0));
+  refused(maq_predictor_draw(automatic.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "draws no samples");
+  refused(maq_predictor_draw(expected.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "draws no samples");
+  refused(maq_predictor_acquire_drawn(automatic.get(), 0, 1, &made), MAQ_ERROR_UNSUPPORTED, "draws no samples");
+  refused(maq_predictor_draw(predictor.get(), 0, 1, 0.1), kWrong, "sample_count is 0");
+  refused(maq_predictor_draw(predictor.get(), 17, 1, 0.1), kWrong, "sample_count is 17");
+  refused(maq_predictor_draw(predictor.get(), 1, 65, 0.1), kWrong, "frame_count is 65");
+  for (const double step_s : {0.0, -0.1, 0.1001, std::nan(""), double(std::numeric_limits<float>::infinity())}) {
+    refused(maq_predictor_draw(predictor.get(), 1, 1, step_s), kWrong, "step_s is");
+  }
+  refused(maq_predictor_acquire_drawn(predictor.get(), 0, 1, &made), kWrong, "Frame 1 of sample 0 was asked for");
+  predictor.draw(2, 3, 0.1);
+  refused(maq_predictor_acquire_drawn(predictor.get(), 2, 1, &made), kWrong, "3 frames (from 1) of 2 samples");
+  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 0, &made), kWrong, "Frame 0");
+  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 4, &made), kWrong, "Frame 4");
+  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 3, nullptr), kWrong, "frame is NULL");
+  refused(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, bits.data(), 255), kWrong, "room for 255");
+  refused(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, nullptr, 256), kWrong, "bits is NULL");
+  EXPECT_EQ(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, bits.data(), 256), MAQ_OK);
+  predictor.push(frame(1));
+  refused(maq_predictor_acquire_drawn(predictor.get(), 0, 1, &made), kWrong, "0 frames");
+  predictor.draw(2, 3, 0.1);
+  predictor.reset();
+  refused(maq_predictor_copy_uncertainty(predictor.get(), 0, 1, bits.data(), 256), kWrong, "0 frames");
+  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+  config.passes = 17;
+  maq_predictor* none = nullptr;
+  EXPECT_EQ(maq_predictor_create(context_.get(), &config, &none), kWrong);
+  EXPECT_NE(text().find("config.passes is 17"), std::string::npos) << text();
+  EXPECT_EQ(maq_predictor_draw(nullptr, 1, 1, 0.1), kWrong);
 }
 
 TEST_F(ApiPrediction, TheAgeOfALiveFrameGrows) {

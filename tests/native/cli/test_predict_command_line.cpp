@@ -94,6 +94,43 @@ TEST_F(PredictCommandLine, PredictedFramesOfAClipHaveABorder) {
   }
 }
 
+TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
+  const std::string drawn =
+      "square.avi --from 9 --frames 2 --samples 2 --seed 5 --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle' ";
+  const auto figures = [&](const std::string& arguments) {
+    const Outcome result = run(drawn + "--compare --json " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out)["frames"];
+  };
+  const auto first = figures("--out row.avi");
+  ASSERT_EQ(first.size(), 2u);
+  for (const auto& frame : first) {
+    ASSERT_EQ(frame["psnr_db"]["samples"].size(), 2u);
+    EXPECT_NE(frame["psnr_db"]["samples"][0], frame["psnr_db"]["samples"][1]);
+    EXPECT_GT(frame["uncertainty_bits"].get<double>(), 0.1);
+  }
+  cv::VideoCapture clip(folder_.file("row.avi"));
+  cv::Mat picture;
+  ASSERT_TRUE(clip.read(picture));
+  EXPECT_EQ(picture.cols, 7 * 160) << "truth, last, motion, auto, two samples, uncertainty";
+  const auto samples_of = [](const nlohmann::json& frames) {
+    std::vector<nlohmann::json> found;
+    for (const auto& frame : frames) found.push_back(frame["psnr_db"]["samples"]);
+    return found;
+  };
+  EXPECT_EQ(samples_of(figures("")), samples_of(first));
+  EXPECT_NE(samples_of(figures("--temperature 0")), samples_of(first));
+  ASSERT_EQ(run(drawn + "--out pictures").exit_code, 0);
+  for (const char* name : {"square_ahead_001_sample_01.png", "square_ahead_002_sample_02.png"}) {
+    EXPECT_NE(read_text(folder_.file(std::string("pictures/") + name)).find("maquette horizon_ns="), std::string::npos);
+  }
+  for (const char* wrong : {"--samples 17", "--samples 2 --temperature -1", "--samples 2 --passes 17", "--seed 3",
+                            "--samples 2 --surprise"}) {
+    EXPECT_EQ(run(std::string("square.avi --compare ") + wrong).exit_code, 2) << wrong;
+  }
+  expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");
+}
+
 TEST_F(PredictCommandLine, AfterTheEndThereIsNothingToCompareWith) {
   const Outcome result = run("square.avi --from 18 --frames 3 --compare");
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -86,26 +86,97 @@ TEST(CodeTransformer, DrawnPlaceAfterPlaceTheLikeliestCodesAreThoseOfPython) {
   const std::string expected = read_text(tiny_transformer::kFolder + "/likeliest.u8");
   for (const size_t samples : {1u, 3u, 1u}) {
     std::vector<uint16_t> found(samples * kCodes);
-    transformer->draw(before(3), {0, 0, 0}, 0, 0, samples, found.data());
+    const std::vector<maq::CodesBefore> each(samples, before(3));
+    transformer->draw(each, {0, 0, 0}, 0, 0, 0, found.data(), nullptr);
     for (size_t i = 0; i < found.size(); ++i) ASSERT_EQ(found[i], uint8_t(expected[i % kCodes])) << samples << " " << i;
   }
 }
 
+struct DrawnFrame {
+  std::vector<uint16_t> codes;
+  std::vector<float> entropy;
+};
+
+// Sample by sample.
+std::vector<DrawnFrame> drawn_after(maq::CodeTransformer& transformer, const std::vector<maq::CodesBefore>& each,
+                                    const maq::SamplingSettings& sampling, size_t passes = 0, uint32_t frame = 1) {
+  std::vector<uint16_t> codes(each.size() * kCodes);
+  std::vector<float> entropy(codes.size());
+  transformer.draw(each, sampling, 7, frame, passes, codes.data(), entropy.data());
+  std::vector<DrawnFrame> found;
+  for (auto at = std::ptrdiff_t(0); at < std::ptrdiff_t(codes.size()); at += std::ptrdiff_t(kCodes)) {
+    const auto end = at + std::ptrdiff_t(kCodes);
+    found.push_back({{codes.begin() + at, codes.begin() + end}, {entropy.begin() + at, entropy.begin() + end}});
+  }
+  return found;
+}
+
+TEST(CodeTransformer, ASampleDependsOnNoOtherAlsoWhereTheyGoOnFromOtherFrames) {
+  const auto transformer = tiny_transformer::open();
+  const maq::SamplingSettings sampling{1, 0, 5};
+  const std::vector<DrawnFrame> alone = drawn_after(*transformer, {before(3)}, sampling),
+                                of_four =
+                                    drawn_after(*transformer, {before(3), before(5), before(3), before(3)}, sampling),
+                                others = drawn_after(*transformer, {before(2), before(5), before(4)}, sampling);
+  EXPECT_EQ(of_four[0].codes, alone[0].codes);
+  EXPECT_EQ(of_four[1].codes, others[1].codes);
+  EXPECT_NE(of_four[2].codes, of_four[0].codes) << "numbers of its own";
+  EXPECT_NE(of_four[2].codes, of_four[3].codes);
+  EXPECT_NE(others[0].codes, alone[0].codes) << "after other frames";
+}
+
+TEST(CodeTransformer, PassesThatSettleGiveWhatPlaceAfterPlaceGives) {
+  const auto transformer = tiny_transformer::open();
+  for (const maq::SamplingSettings& sampling : {maq::SamplingSettings{0, 0, 0}, {1, 0, 5}, {0.5f, 4, 9}}) {
+    const std::vector<maq::CodesBefore> each{before(3), before(5)};
+    const std::vector<DrawnFrame> exact = drawn_after(*transformer, each, sampling),
+                                  once = drawn_after(*transformer, each, sampling, 1),
+                                  settled = drawn_after(*transformer, each, sampling, 300);
+    for (size_t s = 0; s < each.size(); ++s) {
+      EXPECT_EQ(settled[s].codes, exact[s].codes);
+      // Each pass adds at least a place that is as it will stay.
+      EXPECT_TRUE(std::equal(exact[s].codes.begin(), exact[s].codes.begin() + 2, once[s].codes.begin()));
+      for (size_t i = 0; i < kCodes; ++i) ASSERT_NEAR(settled[s].entropy[i], exact[s].entropy[i], 1e-3) << i;
+    }
+  }
+}
+
+TEST(CodeTransformer, TheMeanOfTheBitsOfWhatIsDrawnIsTheEntropy) {
+  const auto transformer = tiny_transformer::open();
+  double entropy = 0, bits = 0, squares = 0;
+  std::vector<float> of_codes(kCodes);
+  constexpr uint32_t kDrawnFrames = 4;
+  for (uint32_t frame = 0; frame < kDrawnFrames; ++frame) {
+    const std::vector<maq::CodesBefore> each(4, before(3));
+    for (const DrawnFrame& drawn : drawn_after(*transformer, each, {1, 0, 2}, 0, frame)) {
+      transformer->bits(before(3), drawn.codes.data(), of_codes.data());
+      for (size_t i = 0; i < kCodes; ++i) {
+        entropy += double(drawn.entropy[i]);
+        bits += double(of_codes[i]);
+        squares += std::pow(double(of_codes[i] - drawn.entropy[i]), 2);
+      }
+    }
+  }
+  EXPECT_NEAR(bits, entropy, 5 * std::sqrt(squares)) << "of what is drawn one after another";
+  EXPECT_GT(entropy / (4 * kDrawnFrames * kCodes), 0.5);
+}
+
 TEST(CodeTransformer, DrawnCodesHaveTheBitsThatWereForeseen) {
   const auto transformer = tiny_transformer::open();
+  const std::vector<maq::CodesBefore> both(2, before(3));
   std::vector<uint16_t> drawn(2 * kCodes), again(2 * kCodes);
   std::vector<float> bits(kCodes);
   double total = 0;
   for (uint32_t frame = 0; frame < 4; ++frame) {
-    transformer->draw(before(3), {1, 0, 11}, 0, frame, 2, drawn.data());
-    transformer->draw(before(3), {1, 0, 11}, 0, frame, 2, again.data());
+    transformer->draw(both, {1, 0, 11}, 0, frame, 0, drawn.data(), nullptr);
+    transformer->draw(both, {1, 0, 11}, 0, frame, 0, again.data(), nullptr);
     EXPECT_EQ(drawn, again);
     EXPECT_FALSE(std::equal(drawn.begin(), drawn.begin() + kCodes, drawn.begin() + kCodes)) << "samples differ";
     for (size_t sample = 0; sample < 2; ++sample) {
       transformer->bits(before(3), drawn.data() + sample * kCodes, bits.data());
       for (const float of_code : bits) total += double(of_code) / (8 * kCodes);
     }
-    transformer->draw(before(3), {1, 0, 12}, 0, frame, 2, again.data());
+    transformer->draw(both, {1, 0, 12}, 0, frame, 0, again.data(), nullptr);
     EXPECT_NE(drawn, again) << "another seed";
   }
   // The mean of what is drawn is the entropy, which is near the bits of frames that were like those in training.
@@ -135,7 +206,7 @@ TEST(CodeTransformer, OfKeptKeysAndValuesNothingOldIsSeen) {
     const float* const seen =
         context->run({{summed.data(), {1, 256, embedding}}, {&time_step, {1, 1}}}, {{1, 256, width}})[0].data;
     for (size_t place = 0; place < 256; ++place) {
-      steps.see(place, seen + place * tables.width);
+      steps.see(place, &seen);
       const uint16_t* const known = codes(number) + place * tables.slices;
       for (size_t k = 0; k < tables.slices; ++k) {
         const float* const logits = steps.logits(k, &known);
@@ -170,6 +241,33 @@ TEST(CodeTransformer, BitsOfACodeAreThoseOfFloat64) {
       }
     }
   }
+}
+
+TEST(CodeTransformer, EntropyIsThatOfFloat64) {
+  std::mt19937 random(6);
+  for (const size_t entries : {1u, 7u, 33u, 512u}) {
+    for (const float scale : {0.0f, 0.1f, 5.0f, 1e4f}) {
+      std::normal_distribution<float> normal(0, 1);
+      std::vector<float> logits(entries);
+      for (float& logit : logits) logit = scale * normal(random);
+      const double largest = double(*std::max_element(logits.begin(), logits.end()));
+      double sum = 0, bits = 0;
+      for (const float logit : logits) sum += std::exp(double(logit) - largest);
+      for (const float logit : logits) {
+        const double below = double(logit) - largest;
+        bits += std::exp(below) / sum * (std::log(sum) - below) / std::log(2.0);
+      }
+      EXPECT_NEAR(double(maq::entropy_bits(logits.data(), entries)), bits, 3e-5) << entries << " " << scale;
+    }
+  }
+  std::vector<float> logits(8, -kInfiniteLogit);
+  EXPECT_EQ(maq::entropy_bits(logits.data(), 8), 3) << "all are equal";
+  logits[2] = logits[3] = 1;
+  EXPECT_EQ(maq::entropy_bits(logits.data(), 8), 1) << "one of two";
+  logits[4] = kInfiniteLogit;
+  EXPECT_EQ(maq::entropy_bits(logits.data(), 8), 0);
+  logits[5] = kNoLogit;
+  EXPECT_TRUE(std::isnan(maq::entropy_bits(logits.data(), 8)));
 }
 
 TEST(CodeTransformer, InfiniteLogitsAreStableAndNaNIsTold) {

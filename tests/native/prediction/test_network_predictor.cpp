@@ -131,7 +131,8 @@ TEST(NetworkPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromTh
         made[i] = half > 0.5f ? half - 0.5f : half < -0.5f ? half + 0.5f : 0.0f;
       }
     } else if (mode == maq::NetworkMode::kDrawn) {
-      own.transformer->draw(before, {}, 1, 0, 1, found.data());
+      before.frames[3] = motion.at(4 * tiny_prediction::kFrame_ns, codes[3].data());
+      own.transformer->draw({before}, {}, 4, 1, 0, found.data(), nullptr);
       own.decoder->picture(found.data(), made.data());
     } else {
       before.frames[3] = motion.at(4 * tiny_prediction::kFrame_ns, codes[3].data());
@@ -251,6 +252,47 @@ TEST(NetworkPredictor, FramesFarAheadAreDrawnInSteps) {
        {std::pair<int64_t, size_t>{33333333, 1}, {100000000, 1}, {100000001, 2}, {250000000, 3}}) {
     by_network.predict(ahead_ns, frame);
     EXPECT_EQ(by_network.steps(), steps);
+  }
+}
+
+TEST(NetworkPredictor, ASampleGoesOnFromItsOwnFramesAndFromWhatMotionForeseesFromTheTrueOnes) {
+  maq::NetworkSettings settings;
+  settings.mode = maq::NetworkMode::kDrawn;
+  settings.sampling.seed = 6;
+  maq::NetworkPredictor by_network(networks(), settings, 1);
+  const maq::PredictionNetworks own = networks();
+  maq::MotionCodes motion(own.encoder);
+  std::vector<uint16_t> seen[4];
+  std::vector<uint8_t> squeezed(64 * 64 * 3);
+  for (int number = 0; number < 4; ++number) {
+    const maq::Frame frame = tiny_prediction::frame(number);
+    by_network.push(frame);
+    seen[number].resize(own.encoder->codes().count());
+    own.encoder->run(frame.image, seen[number].data(), squeezed.data());
+    motion.add(squeezed.data(), frame.timestamp_ns);
+  }
+  by_network.draw(2, 2, tiny_prediction::kFrame_ns);
+  EXPECT_EQ(by_network.steps(), 4u);
+  std::vector<uint16_t> drawn(2 * seen[3].size());
+  std::vector<float> entropy(drawn.size()), found(256);
+  std::vector<maq::CodesBefore> before(2);
+  for (uint32_t number = 1; number <= 2; ++number) {
+    const uint16_t* const moved = motion.at((3 + number) * tiny_prediction::kFrame_ns, seen[3].data());
+    const std::vector<uint16_t> latest = drawn;
+    for (size_t s = 0; s < 2; ++s) {
+      const uint16_t* const last = number == 1 ? seen[3].data() : latest.data() + s * seen[3].size();
+      before[s].frames = {seen[number].data(), seen[number + 1].data(), last, moved};
+      before[s].newest = last;
+      before[s].step_s = 0.1f;
+    }
+    own.transformer->draw(before, settings.sampling, 4, number, 0, drawn.data(), entropy.data());
+    for (size_t s = 0; s < 2; ++s) {
+      by_network.drawn_entropy(s, number, found.data());
+      for (size_t place = 0; place < 256; ++place) {
+        const float* const of_place = entropy.data() + s * seen[3].size() + 2 * place;
+        ASSERT_NEAR(found[place], (of_place[0] + of_place[1]) / 2, 1e-6) << number << " " << s << " " << place;
+      }
+    }
   }
 }
 

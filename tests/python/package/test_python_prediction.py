@@ -52,6 +52,24 @@ def test_the_last_frame_is_one_method_and_captured_frames_have_no_origin():
     assert frame.origin is None
 
 
+def test_samples_are_drawn_each_by_itself_and_say_where_they_are_uncertain():
+    with maquette.Predictor("network", network_mode=3, temperature=1, seed=2, threads=1) as predictor:
+        for number in range(4):
+            predictor.push(textured(STEP_PX * number), time_s=number * PERIOD_S)
+        predictor.draw(3, 2, PERIOD_S)
+        frame, bits = predictor.drawn(1, 2), predictor.uncertainty(1, 2)
+        assert frame.origin.horizon_s == pytest.approx(2 * PERIOD_S)
+        assert bits.shape == (16, 16)
+        assert bits.dtype == np.float32
+        assert 0.3 < bits.mean() < 9
+        assert not np.array_equal(frame.pixels(), predictor.drawn(0, 2).pixels())
+        predictor.draw(2, 2, PERIOD_S)  # of the shipped networks, in int8
+        assert np.array_equal(frame.pixels(), predictor.drawn(1, 2).pixels())
+        assert np.array_equal(bits, predictor.uncertainty(1, 2))
+        with pytest.raises(maquette.MaquetteError, match="of 2 samples"):
+            predictor.drawn(2, 1)
+
+
 def test_a_predictor_that_has_forgotten_its_frames_asks_for_one(moving):
     moving.reset()
 

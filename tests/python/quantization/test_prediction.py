@@ -57,6 +57,23 @@ def expected_error(fp32: Path, int8: Path) -> float:
     return largest_difference(*(session(folder / "expected.onnx").run(None, given)[0] for folder in (fp32, int8)))
 
 
+def assert_samples_do_not_depend_on_each_other(int8: Path) -> None:
+    rng = np.random.default_rng(1)
+    graph = session(int8 / "slices.onnx")
+    sizes = {"samples": 3, "rows": 1, "kept": 5, "kept_and_rows": 6}
+    given = {i.name: rng.standard_normal([sizes.get(n, n) for n in i.shape]).astype(np.float32)
+             for i in graph.get_inputs()}  # fmt: skip
+    given["near"][2] *= 10
+    alone = {name: array if name.startswith("bias") else array[:1] for name, array in given.items()}
+    for one, other in zip(graph.run(None, alone), graph.run(None, given), strict=True):
+        np.testing.assert_array_equal(one, other[:1])
+    head = session(int8 / "head_1.onnx")
+    features, earlier = rng.standard_normal((2, 3, 1, SHAPE.width)).astype(np.float32)
+    features[2] *= 10
+    one = head.run(None, {"features": features[:1], "earlier": earlier[:1]})[0]
+    np.testing.assert_array_equal(one, head.run(None, {"features": features, "earlier": earlier})[0][:1])
+
+
 def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     for split in ("train", "val"):
         folder = tmp_path / "clips/shapes" / split
@@ -76,7 +93,9 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     codes[:, 1:] = torch.where(torch.rand(codes[:, 1:].shape) < 0.7, codes[:, :1], codes[:, 1:])
     motion = codes[:, :, None].expand(-1, -1, 5, -1, -1, -1)
     (tmp_path / "codes").mkdir()
-    write_codes(CodedClips(codes, torch.tensor([10.0, 30.0]), ["a", "b"], motion), tmp_path / "codes/codes-val.npz")
+    for split in ("train", "val"):
+        own = CodedClips(codes, torch.tensor([10.0, 30.0]), ["a", "b"], motion)
+        write_codes(own, tmp_path / f"codes/codes-{split}.npz")
     monkeypatch.setattr("sys.argv", [
         "prediction", "--fp32", str(fp32), "--out", str(int8), "--data", str(tmp_path / "clips"), "--sets", "shapes",
         "--codes", str(tmp_path / "codes"),
@@ -88,6 +107,7 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     assert measured["psnr_db_int8"] == pytest.approx(measured["psnr_db_fp32"], abs=0.3)
     assert measured["bits_int8"] == pytest.approx(measured["bits_fp32"], rel=0.02)
     assert 0 < expected_error(fp32, int8) < 0.05
+    assert_samples_do_not_depend_on_each_other(int8)
     assert manifest["precision"] == "int8"
     assert manifest["transformer"] == {"file": TRANSFORMER, "fps": [10, 30]}
     assert manifest["expected"] == {"before": 3, "frames": 4, "max_ahead": 12, "fps": [10, 30]}

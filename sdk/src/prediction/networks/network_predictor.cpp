@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "core/clock.h"
+#include "core/error.h"
 
 namespace maq {
 namespace {
-
-constexpr int64_t kLongestStep_ns = 100000000;  // of drawn frames: the transformer was trained up to that
 
 // How much of what the mended picture changes is taken, and how many grey levels less: the mean of two predictions is
 // better than either, and at full size motion is more exact than the network has learnt; the rest is noise of int8.
@@ -24,12 +23,10 @@ NetworkPredictor::NetworkPredictor(PredictionNetworks networks, const NetworkSet
       base_({MAQ_PREDICTION_AUTO, threads}),
       threads_(threads),
       history_(networks_.encoder->codes().count()),
-      drawn_history_(history_),
       pictures_(size_t(networks_.encoder->frame_px()) * size_t(networks_.encoder->frame_px()) * 3),
       motion_(networks_.encoder),
       codes_(networks_.encoder->codes().count()),
-      base_codes_(codes_.size()),
-      drawn_(codes_.size()) {
+      base_codes_(codes_.size()) {
   const auto side_px = size_t(networks_.encoder->frame_px());
   squeezed_.resize(side_px * side_px * 3);
   made_.resize(squeezed_.size());
@@ -44,10 +41,12 @@ void NetworkPredictor::reset() {
   motion_.reset();
   has_frame_ = false;
   step_ns_ = 0;
+  count_ = 0;
 }
 
 void NetworkPredictor::push(const Frame& frame) {
   const bool has_codes = settings_.mode != NetworkMode::kMended;
+  count_ = 0;
   Stopwatch stage;
   if (has_codes) {
     networks_.encoder->run(frame.image, codes_.data(), squeezed_.data());
@@ -83,24 +82,80 @@ void NetworkPredictor::mend(int64_t ahead_ns) {
              made_.data());
 }
 
-void NetworkPredictor::draw(int64_t ahead_ns) {
-  const auto count = std::max<int64_t>(1, (ahead_ns + kLongestStep_ns - 1) / kLongestStep_ns);
-  drawn_history_ = history_;
-  std::copy(codes_.begin(), codes_.end(), drawn_.begin());
-  CodeTransformer& transformer = *networks_.transformer;
-  for (int64_t k = 1; k <= count; ++k) {
-    const int64_t time_ns = newest_ns_ + ahead_ns * k / count;
-    CodesBefore before;
-    base_codes_ = drawn_;
-    before.newest = base_codes_.data();
-    drawn_history_.select(time_ns, transformer.before(), before.frames.data());
-    if (transformer.has_motion()) before.frames[transformer.before()] = motion_.at(time_ns, codes_.data());
-    before.step_s = float(double(ahead_ns) / double(count) / 1e9);
-    transformer.draw(before, settings_.sampling, uint32_t(k), frame_, 1, drawn_.data());
-    drawn_history_.add(drawn_.data(), time_ns);
+size_t NetworkPredictor::codes_at(size_t sample, size_t number) const {
+  if (sample >= samples_ || number < 1 || number > count_) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Frame ", number, " of sample ", sample, " was asked for, but ", count_,
+                " frames (from 1) of ", samples_, " samples (from 0) were drawn since the latest frame.");
   }
-  ++frame_;
-  steps_ = size_t(count);
+  return ((number - 1) * samples_ + sample) * codes_.size();
+}
+
+void NetworkPredictor::draw(size_t samples, size_t count, int64_t step_ns) {
+  count_ = samples_ = steps_ = 0;
+  networks_ms_ = 0;
+  if (settings_.mode != NetworkMode::kDrawn) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "This predictor draws no samples; make one whose network_mode does.");
+  }
+  if (!has_frame_) throw Error(MAQ_ERROR_INVALID_ARGUMENT, "No frame was pushed; push those of the stream first.");
+  const size_t of_frame = codes_.size();
+  drawn_.resize(count * samples * of_frame);
+  entropy_.assign(drawn_.size(), 0.0f);
+  if (step_ns_ == 0 || !base_.moves()) {
+    for (size_t i = 0; i < drawn_.size(); i += of_frame)
+      std::copy(codes_.begin(), codes_.end(), drawn_.begin() + std::ptrdiff_t(i));
+  } else {
+    Stopwatch stage;
+    CodeTransformer& transformer = *networks_.transformer;
+    histories_.assign(samples, history_);
+    before_.assign(samples, {});
+    uint16_t* codes = drawn_.data();
+    for (size_t k = 1; k <= count; ++k, codes += samples * of_frame) {
+      const int64_t time_ns = newest_ns_ + int64_t(k) * step_ns;
+      // Of the true frames: it is worth 1 to 2 dB more than that of a sample's own.
+      const uint16_t* const moved = transformer.has_motion() ? motion_.at(time_ns, codes_.data()) : nullptr;
+      for (size_t s = 0; s < samples; ++s) {
+        const uint16_t* const latest = codes - (samples - s) * of_frame;
+        if (k > 1) histories_[s].add(latest, time_ns - step_ns);
+        CodesBefore& before = before_[s];
+        before = {};
+        before.newest = k == 1 ? codes_.data() : latest;
+        before.step_s = float(double(step_ns) / 1e9);
+        // Of the first frame all see the same.
+        histories_[k == 1 ? 0 : s].select(time_ns, transformer.before(), before.frames.data());
+        if (transformer.has_motion()) before.frames[transformer.before()] = moved;
+      }
+      transformer.draw(before_, settings_.sampling, uint32_t(base_.stats().pushed), uint32_t(k), settings_.passes,
+                       codes, entropy_.data() + (codes - drawn_.data()));
+    }
+    networks_ms_ = float(stage.lap_ms());
+    steps_ = samples * count;
+  }
+  samples_ = samples;
+  count_ = count;
+  drawn_step_ns_ = step_ns;
+}
+
+void NetworkPredictor::add_made(Frame& frame) {
+  networks_.encoder->run(frame.image, base_codes_.data());
+  networks_.decoder->picture(base_codes_.data(), of_base_.data());
+  for (size_t i = 0; i < made_.size(); ++i) made_[i] -= of_base_[i];
+  difference_.add(made_.data(), networks_.encoder->frame_px(), frame.image, threads_, frame.storage.data());
+}
+
+void NetworkPredictor::drawn_picture(size_t sample, size_t number, Frame& frame) {
+  const size_t at = codes_at(sample, number);
+  base_.predict(int64_t(number) * drawn_step_ns_, frame);
+  if (steps_ == 0) return;  // nothing moves
+  networks_.decoder->picture(drawn_.data() + at, made_.data());
+  add_made(frame);
+}
+
+void NetworkPredictor::drawn_entropy(size_t sample, size_t number, float* bits) const {
+  const size_t at = codes_at(sample, number), slices = networks_.encoder->codes().slices;
+  for (size_t place = 0; place < places(); ++place) {
+    bits[place] = 0;
+    for (size_t k = 0; k < slices; ++k) bits[place] += entropy_[at + place * slices + k] / float(slices);
+  }
 }
 
 void NetworkPredictor::foresee(int64_t ahead_ns) {
@@ -114,34 +169,33 @@ void NetworkPredictor::foresee(int64_t ahead_ns) {
 void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
   base_.predict(ahead_ns, frame);
   networks_ms_ = 0;
-  steps_ = 0;
+  count_ = steps_ = 0;
   if (ahead_ns == 0 || step_ns_ == 0 || !base_.moves()) return;
   Stopwatch stage;
   switch (settings_.mode) {
     case NetworkMode::kMended:
       networks_.encoder->squeeze(frame.image, squeezed_.data());
       mend(ahead_ns);
+      for (size_t i = 0; i < made_.size(); ++i) {
+        const float difference = (made_[i] - float(squeezed_[i])) * kTrust;
+        made_[i] = difference - std::clamp(difference, -kNoise, kNoise);
+      }
+      difference_.add(made_.data(), networks_.encoder->frame_px(), frame.image, threads_, frame.storage.data());
       break;
     case NetworkMode::kExpected:
       foresee(ahead_ns);
       networks_.decoder->picture(features_.data(), made_.data());
+      add_made(frame);
       break;
-    case NetworkMode::kDrawn:
-      draw(ahead_ns);
-      networks_.decoder->picture(drawn_.data(), made_.data());
+    case NetworkMode::kDrawn: {
+      const int64_t count = (ahead_ns + kLongestStep_ns - 1) / kLongestStep_ns;
+      draw(1, size_t(count), ahead_ns / count);
+      networks_.decoder->picture(drawn_.data() + (size_t(count) - 1) * codes_.size(), made_.data());
+      add_made(frame);
+      count_ = 0;
       break;
-  }
-  if (settings_.mode == NetworkMode::kMended) {
-    for (size_t i = 0; i < made_.size(); ++i) {
-      const float difference = (made_[i] - float(squeezed_[i])) * kTrust;
-      made_[i] = difference - std::clamp(difference, -kNoise, kNoise);
     }
-  } else {
-    networks_.encoder->run(frame.image, base_codes_.data());
-    networks_.decoder->picture(base_codes_.data(), of_base_.data());
-    for (size_t i = 0; i < made_.size(); ++i) made_[i] -= of_base_[i];
   }
-  difference_.add(made_.data(), networks_.encoder->frame_px(), frame.image, threads_, frame.storage.data());
   networks_ms_ = float(stage.lap_ms());
 }
 

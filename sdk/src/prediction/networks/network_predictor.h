@@ -37,6 +37,7 @@ enum class NetworkMode {
 struct NetworkSettings {
   NetworkMode mode = NetworkMode::kMended;
   SamplingSettings sampling;
+  size_t passes = 0;  // as of CodeTransformer::draw()
 };
 
 // Not for two threads at once.
@@ -54,31 +55,55 @@ class NetworkPredictor {
   void predict(int64_t ahead_ns, Frame& frame);
   void reset();
 
+  // Draws `samples` streams of `count` frames that may come, `step_ns` apart, each seen as true when the next one of
+  // its stream is drawn, beside what motion foresees from the true ones; all are the last frame while nothing moves,
+  // and before the second frame. `step_ns` is at most kLongestStep_ns, and all of them at most Predictor::kMaxAhead_ns.
+  // They are known until another frame is pushed, predict() or reset(). Throws MAQ_ERROR_UNSUPPORTED in another mode
+  // than kDrawn, MAQ_ERROR_INVALID_ARGUMENT before the first frame; what the networks throw.
+  static constexpr int64_t kLongestStep_ns = 100000000;  // the transformer was trained up to that
+  static constexpr size_t kMaxDrawn = 64;                // frames of a stream
+  void draw(size_t samples, size_t count, int64_t step_ns);
+  // The picture of frame `number`, from 1, of a sample, from 0, as predict() makes it. Throws
+  // MAQ_ERROR_INVALID_ARGUMENT for one that was not drawn; what that throws.
+  void drawn_picture(size_t sample, size_t number, Frame& frame);
+  // Bits of a code there, mean of each place: [places]. Throws MAQ_ERROR_INVALID_ARGUMENT for one that was not drawn.
+  void drawn_entropy(size_t sample, size_t number, float* bits) const;
+  // From now: as long as the latest push.
+  int64_t step_ns() const { return step_ns_; }
+  size_t places() const { return networks_.encoder->codes().places(); }
+
   const PredictorStats& stats() const { return base_.stats(); }
-  float networks_ms() const { return networks_ms_; }  // of the latest push or prediction
-  size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction
+  float networks_ms() const { return networks_ms_; }  // of the latest push, prediction or draw
+  size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction or draw
 
  private:
-  // Of the time `ahead_ns` after the newest frame: a picture into made_; features of the decoder; codes into drawn_.
+  // Of the time `ahead_ns` after the newest frame: a picture into made_; features of the decoder.
   void mend(int64_t ahead_ns);
   void foresee(int64_t ahead_ns);
-  void draw(int64_t ahead_ns);
+  size_t codes_at(size_t sample, size_t number) const;  // where they begin in drawn_ and entropy_
+  // made_ less the picture of the codes of base_'s, at full size: `frame` is changed by that.
+  void add_made(Frame& frame);
 
   const PredictionNetworks networks_;
   const NetworkSettings settings_;
   Predictor base_;
   WorkerThreads threads_;
-  CodeHistory history_, drawn_history_;  // of modes with codes
-  PictureHistory pictures_;              // of the other
+  CodeHistory history_;      // of modes with codes
+  PictureHistory pictures_;  // of the other
   MotionCodes motion_;
   PictureDifference difference_;
-  std::vector<uint16_t> codes_, base_codes_, drawn_;
+  std::vector<uint16_t> codes_, base_codes_;
+  std::vector<CodeHistory> histories_;  // by sample, each with its own frames
+  std::vector<CodesBefore> before_;
+  std::vector<uint16_t> drawn_;  // [count][samples][places][slices]
+  std::vector<float> entropy_;
+  size_t samples_ = 0, count_ = 0;  // of these; 0: none are known
+  int64_t drawn_step_ns_ = 0;
   std::vector<uint8_t> squeezed_;
   std::vector<float> features_, made_, of_base_;
   bool has_frame_ = false;
   int64_t newest_ns_ = 0, step_ns_ = 0;  // the latter from the frame before
   uint64_t resets_ = 0;                  // of base_
-  uint32_t frame_ = 0;                   // counts predictions, for random numbers
   float networks_ms_ = 0;
   size_t steps_ = 0;
 };

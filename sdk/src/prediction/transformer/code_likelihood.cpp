@@ -43,11 +43,10 @@ MAQ_SIMD_CLONES float largest_of(const float* logits, size_t entries) {
   return found;
 }
 
-// exp of what each is below the largest. Two loops: in one, the compiler would branch at the limit, and make no
-// vectors.
-MAQ_SIMD_CLONES void weights_of(const float* logits, size_t entries, float largest, float* weights) {
+// Two loops: in one, the compiler would branch at the limit, and make no vectors.
+MAQ_SIMD_CLONES void weigh(const float* logits, size_t entries, float largest, float temperature, float* weights) {
   for (size_t i = 0; i < entries; ++i) {
-    const float below = logits[i] - largest;
+    const float below = (logits[i] - largest) / temperature;
     weights[i] = below > -87.0f ? below : -87.0f;
   }
   for (size_t i = 0; i < entries; ++i) weights[i] = exp_of_negative(weights[i]);
@@ -71,6 +70,12 @@ void add_stored_prior(const uint8_t* bits, size_t entries, float* logits) {
   add_scaled(bits, entries, -0.69314718f / FrameCodes::kBitSteps, logits);
 }
 
+float largest_logit(const float* logits, size_t entries) { return largest_of(logits, entries); }
+
+void weights_of(const float* logits, size_t entries, float largest, float temperature, float* weights) {
+  weigh(logits, entries, largest, temperature, weights);
+}
+
 float bits_of_code(const float* logits, size_t entries, size_t code) {
   const float largest = largest_of(logits, entries);
   if (std::isnan(largest)) return largest;
@@ -79,9 +84,20 @@ float bits_of_code(const float* logits, size_t entries, size_t code) {
     return std::log2(float(std::count(logits, logits + entries, largest)));
   }
   std::array<float, kMaxCodeEntries> weights;
-  weights_of(logits, entries, largest, weights.data());
+  weigh(logits, entries, largest, 1, weights.data());
   const float bits = std::log2(sum_of(weights.data(), entries)) - (logits[code] - largest) * kLog2E;
   return std::clamp(bits, 0.0f, kMaxCodeBits);
+}
+
+float entropy_bits(const float* logits, size_t entries) {
+  const float largest = largest_of(logits, entries);
+  if (std::isnan(largest)) return largest;
+  if (std::isinf(largest)) return std::log2(float(std::count(logits, logits + entries, largest)));
+  std::array<float, kMaxCodeEntries> weights;
+  weigh(logits, entries, largest, 1, weights.data());
+  const float sum = sum_of(weights.data(), entries);
+  for (size_t i = 0; i < entries; ++i) weights[i] *= std::min(largest - logits[i], 87.0f);
+  return std::log2(sum) + sum_of(weights.data(), entries) / sum * kLog2E;
 }
 
 }  // namespace maq

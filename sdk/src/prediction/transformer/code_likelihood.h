@@ -15,4 +15,14 @@ void add_stored_prior(const uint8_t* bits, size_t entries, float* logits);
 // all where there are some; where all are -infinity they are equal. NaN where a logit is NaN.
 float bits_of_code(const float* logits, size_t entries, size_t code);
 
+// The mean of that by these probabilities: how uncertain the code is, 0 to log2(entries). NaN where a logit is NaN.
+float entropy_bits(const float* logits, size_t entries);
+
+// NaN where one of them is.
+float largest_logit(const float* logits, size_t entries);
+
+// exp((logit - largest) / temperature) of each, at least exp(-87), the same on every processor. Neither of the numbers
+// is infinite.
+void weights_of(const float* logits, size_t entries, float largest, float temperature, float* weights);
+
 }  // namespace maq

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/error.h"
-#include "core/simd_clones.h"
+#include "prediction/transformer/code_likelihood.h"
 #include "prediction/transformer/philox.h"
 
 namespace maq {
@@ -14,15 +14,6 @@ namespace {
 
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 constexpr float kUnit = 1 << 30;  // the weight of the likeliest
-
-// Two loops: in one, the compiler would branch at the limit, and make no vectors.
-MAQ_SIMD_CLONES void weigh(const float* logits, size_t entries, float largest, float temperature, float* weights) {
-  for (size_t i = 0; i < entries; ++i) {
-    const float below = (logits[i] - largest) / temperature;
-    weights[i] = below > -87.0f ? below : -87.0f;
-  }
-  for (size_t i = 0; i < entries; ++i) weights[i] = exp_of_negative(weights[i]) * kUnit;
-}
 
 }  // namespace
 
@@ -38,19 +29,20 @@ CodeSampler::CodeSampler(const SamplingSettings& settings, size_t entries)
 
 uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   const size_t entries = weights_.size();
-  if (std::any_of(logits, logits + entries, [](float logit) { return std::isnan(logit); })) {
+  const float largest = largest_logit(logits, entries), temperature = settings_.temperature;
+  if (std::isnan(largest)) {
     throw Error(MAQ_ERROR_INFERENCE, "The transformer gave NaN. Install the bundle again.");
   }
-  const float* const best = std::max_element(logits, logits + entries);  // the first of equals
-  const float largest = *best, temperature = settings_.temperature;
-  if (temperature == 0 || settings_.top_k == 1) return uint16_t(best - logits);
+  const auto likeliest = uint16_t(std::find(logits, logits + entries, largest) - logits);  // the first of equals
+  if (temperature == 0 || settings_.top_k == 1) return likeliest;
 
   if (std::isinf(largest)) {  // of +infinite ones each; where all are -infinite, each of all
     std::transform(logits, logits + entries, weights_.begin(), [&](float l) { return l == largest ? kUnit : 0.0f; });
   } else if (std::isinf(temperature)) {
     std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kUnbounded ? kUnit : 0.0f; });
   } else {
-    weigh(logits, entries, largest, temperature, weights_.data());
+    weights_of(logits, entries, largest, temperature, weights_.data());
+    for (float& weight : weights_) weight *= kUnit;
   }
   if (settings_.top_k > 1 && settings_.top_k < entries) {
     std::copy_n(logits, entries, sorted_.begin());
@@ -69,7 +61,7 @@ uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   }
 
   uint64_t total = 0;
-  for (const float weight : weights_) total += uint64_t(weight);
+  for (const float weight : weights_) total += uint32_t(int32_t(weight));
   const std::array<uint32_t, 4> words =
       philox({position.place, position.frame, position.stream, uint32_t(position.sample) << 16 | position.slice},
              settings_.seed);
@@ -77,11 +69,11 @@ uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   const uint64_t random = (uint64_t(words[0]) << 32 | words[1]) >> 11;
   uint64_t left = std::min(uint64_t(double(random) * 0x1p-53 * double(total)), total - 1);
   for (size_t i = 0; i < entries; ++i) {
-    const auto weight = uint64_t(weights_[i]);
+    const auto weight = uint32_t(int32_t(weights_[i]));
     if (left < weight) return uint16_t(i);
     left -= weight;
   }
-  return uint16_t(best - logits);  // not reached: the weights add up to the total
+  return likeliest;  // not reached: the weights add up to the total
 }
 
 }  // namespace maq

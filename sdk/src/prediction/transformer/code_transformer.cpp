@@ -58,20 +58,30 @@ void CodeTransformer::add_prior(size_t slice, uint16_t code_before, const float*
                    logits_.data());
 }
 
-void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, float* bits) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+void CodeTransformer::see_places(const uint16_t* codes) {
   const TransformerTables& tables = parts_.tables;
-  see_context(before);
   for (size_t place = 0; place < tables.places(); ++place) rows_.set(place, codes + place * tables.slices);
   for (size_t place = 0; place < tables.places(); ++place) {
     rows_.near(place, near_.data() + place * kNearCodes * tables.embedding);
   }
   head_inputs_[0].data = slices_->run(slice_inputs_, slice_outputs_)[0].data;
+}
+
+const float* CodeTransformer::head_logits(size_t slice, const uint16_t* codes) {
+  const TransformerTables& tables = parts_.tables;
+  for (size_t place = 0; place < tables.places(); ++place) {
+    sum_earlier_rows(tables, slice, codes + place * tables.slices, earlier_.data() + place * tables.width);
+  }
+  return heads_[slice]->run(head_inputs_, head_outputs_)[0].data;
+}
+
+void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, float* bits) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const TransformerTables& tables = parts_.tables;
+  see_context(before);
+  see_places(codes);
   for (size_t k = 0; k < tables.slices; ++k) {
-    for (size_t place = 0; place < tables.places(); ++place) {
-      sum_earlier_rows(tables, k, codes + place * tables.slices, earlier_.data() + place * tables.width);
-    }
-    const float* logits = heads_[k]->run(head_inputs_, head_outputs_)[0].data;
+    const float* logits = head_logits(k, codes);
     for (size_t place = 0; place < tables.places(); ++place, logits += tables.entries) {
       const size_t i = place * tables.slices + k;
       add_prior(k, before.newest[i], logits);
@@ -83,34 +93,93 @@ void CodeTransformer::bits(const CodesBefore& before, const uint16_t* codes, flo
   }
 }
 
-void CodeTransformer::draw(const CodesBefore& before, const SamplingSettings& sampling, uint32_t stream, uint32_t frame,
-                           size_t samples, uint16_t* codes) {
+uint16_t CodeTransformer::draw_code(CodeSampler& sampler, const DrawPosition& position, float* entropy) const {
+  if (entropy != nullptr) *entropy = entropy_bits(logits_.data(), logits_.size());
+  return sampler.draw(logits_.data(), position);
+}
+
+void CodeTransformer::draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first,
+                                     size_t passes, uint16_t* codes, float* entropy) {
   const TransformerTables& tables = parts_.tables;
-  CodeSampler sampler(sampling, tables.entries);
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const uint16_t* const by_motion = has_motion() ? before.frames[tables.before] : nullptr;
+  std::copy_n(by_motion != nullptr ? by_motion : before.newest, tables.places() * tables.slices, codes);
+  bool is_other = true;
+  for (size_t pass = 0; pass < passes && is_other; ++pass) {
+    is_other = false;
+    see_places(codes);
+    DrawPosition at = first;
+    for (size_t k = 0; k < tables.slices; ++k) {
+      at.slice = uint16_t(k);
+      const float* logits = head_logits(k, codes);
+      for (size_t place = 0; place < tables.places(); ++place, logits += tables.entries) {
+        const size_t i = place * tables.slices + k;
+        at.place = uint32_t(place);
+        add_prior(k, before.newest[i], logits);
+        const uint16_t code = draw_code(sampler, at, entropy == nullptr ? nullptr : entropy + i);
+        is_other |= code != codes[i];
+        codes[i] = code;
+      }
+    }
+  }
+}
+
+void CodeTransformer::draw_in_steps(const std::vector<CodesBefore>& before, CodeSampler& sampler,
+                                    const DrawPosition& first, float* entropy) {
+  const TransformerTables& tables = parts_.tables;
+  const size_t samples = before.size(), of_frame = tables.places() * tables.slices,
+               of_context = tables.places() * tables.width;
   if (steps_ == nullptr || steps_->samples() != samples) {
     steps_ = nullptr;
     steps_ = std::make_unique<PlaceSteps>(runtime_, parts_, bias_, samples, settings_);
   }
-  see_context(before);
-  const float* context = slice_inputs_[0].data;
-  const size_t of_frame = tables.places() * tables.slices;
-  drawn_.resize(samples * of_frame);
-  std::array<const uint16_t*, kMaxSamples> at_place;
+  contexts_.resize(samples * of_context);
+  std::array<const float*, kMaxSamples> context;
+  for (size_t s = 0; s < samples; ++s) {
+    context[s] = s == 0 ? nullptr : context[s - 1];
+    if (s > 0 && before[s].frames == before[s - 1].frames && before[s].step_s == before[s - 1].step_s) continue;
+    see_context(before[s]);
+    const float* const seen = slice_inputs_[0].data;
+    context[s] = std::copy_n(seen, of_context, contexts_.data() + s * of_context) - of_context;
+  }
+  std::array<const uint16_t*, kMaxSamples> codes;
+  DrawPosition at = first;
   steps_->begin();
-  for (size_t place = 0; place < tables.places(); ++place, context += tables.width) {
-    steps_->see(place, context);
-    for (size_t s = 0; s < samples; ++s) at_place[s] = drawn_.data() + s * of_frame + place * tables.slices;
+  for (size_t place = 0; place < tables.places(); ++place) {
+    at.place = uint32_t(place);
+    steps_->see(place, context.data());
+    for (size_t s = 0; s < samples; ++s) codes[s] = drawn_.data() + s * of_frame + place * tables.slices;
     for (size_t k = 0; k < tables.slices; ++k) {
-      const float* logits = steps_->logits(k, at_place.data());
+      at.slice = uint16_t(k);
+      const float* logits = steps_->logits(k, codes.data());
       for (size_t s = 0; s < samples; ++s, logits += tables.entries) {
-        const size_t i = place * tables.slices + k;
-        add_prior(k, before.newest[i], logits);
-        drawn_[s * of_frame + i] =
-            sampler.draw(logits_.data(), {stream, frame, uint16_t(s), uint16_t(k), uint32_t(place)});
+        const size_t of_code = place * tables.slices + k, i = s * of_frame + of_code;
+        at.sample = uint16_t(s);
+        add_prior(k, before[s].newest[of_code], logits);
+        drawn_[i] = draw_code(sampler, at, entropy == nullptr ? nullptr : entropy + i);
       }
     }
-    steps_->set(place, at_place.data());
+    steps_->set(place, codes.data());
+  }
+}
+
+void CodeTransformer::draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling, uint32_t stream,
+                           uint32_t frame, size_t passes, uint16_t* codes, float* entropy) {
+  CodeSampler sampler(sampling, parts_.tables.entries);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const size_t of_frame = parts_.tables.places() * parts_.tables.slices;
+  DrawPosition at;
+  at.stream = stream;
+  at.frame = frame;
+  drawn_.resize(before.size() * of_frame);
+  if (passes == 0) {
+    draw_in_steps(before, sampler, at, entropy);
+  } else {
+    for (size_t s = 0; s < before.size(); ++s) {
+      at.sample = uint16_t(s);
+      see_context(before[s]);
+      draw_in_passes(before[s], sampler, at, passes, drawn_.data() + s * of_frame,
+                     entropy == nullptr ? nullptr : entropy + s * of_frame);
+    }
   }
   std::copy(drawn_.begin(), drawn_.end(), codes);
 }

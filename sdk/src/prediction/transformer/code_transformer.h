@@ -37,15 +37,28 @@ class CodeTransformer {
   // also where a network gives NaN; `bits` are then of no use.
   void bits(const CodesBefore& before, const uint16_t* codes, float* bits);
 
-  // Draws the codes of `samples` frames, 1 to kMaxSamples, place after place and so exactly by what the network says:
-  // [samples][places][slices]. `stream` and `frame` count their random numbers. Throws what bits() throws, and what
+  // Draws the codes of 1 to kMaxSamples frames, each after its own `before`: [samples][places][slices]. `passes` is 0:
+  // place after place, and so exactly by what the network says. Else all places at once, at most so many times, each
+  // time after those that were drawn the time before, at first what motion foresees: after a pass that changes nothing
+  // they are those of place after place (Song et al., "Accelerating feedforward computation via parallel nonlinear
+  // equation solving", ICML 2021). A sample does not depend on the others. `stream` and `frame` count their random
+  // numbers. `entropy`, unless null: of each code's probabilities, in bits. Throws what bits() throws, and what
   // CodeSampler throws; `codes` are then as before.
-  static constexpr size_t kMaxSamples = 16;
-  void draw(const CodesBefore& before, const SamplingSettings& sampling, uint32_t stream, uint32_t frame,
-            size_t samples, uint16_t* codes);
+  static constexpr size_t kMaxSamples = 16, kMaxPasses = 16;
+  void draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling, uint32_t stream, uint32_t frame,
+            size_t passes, uint16_t* codes, float* entropy);
 
  private:
   void see_context(const CodesBefore& before);
+  // All places at once: features of a frame's codes for head_logits(), which gives [places][entries].
+  void see_places(const uint16_t* codes);
+  const float* head_logits(size_t slice, const uint16_t* codes);
+  // By logits_, which are known.
+  uint16_t draw_code(CodeSampler& sampler, const DrawPosition& position, float* entropy) const;
+  void draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first, size_t passes,
+                      uint16_t* codes, float* entropy);
+  void draw_in_steps(const std::vector<CodesBefore>& before, CodeSampler& sampler, const DrawPosition& first,
+                     float* entropy);
   // Logits of a head, with the table by the code that the place had before, into logits_.
   void add_prior(size_t slice, uint16_t code_before, const float* logits);
 
@@ -59,6 +72,7 @@ class CodeTransformer {
   SliceRows rows_;
   std::unique_ptr<PlaceSteps> steps_;  // of as many samples as were drawn latest
   std::vector<uint16_t> drawn_;
+  std::vector<float> contexts_;  // of samples whose frames before differ
   // [layers][heads][places][places]: added to the score of a query and a key, -infinity for keys after the query.
   std::vector<float> bias_;
   std::vector<float> summed_, near_, earlier_, logits_;

@@ -47,11 +47,11 @@ void PlaceSteps::begin() {
   for (std::vector<float>& row : row_bias_) std::fill(row.begin(), row.end(), -std::numeric_limits<float>::infinity());
 }
 
-void PlaceSteps::see(size_t place, const float* context) {
+void PlaceSteps::see(size_t place, const float* const* context) {
   const TransformerTables& tables = parts_.tables;
   const size_t places = tables.places(), of_head = parts_.head_width;
   for (size_t sample = 0; sample < samples(); ++sample) {
-    std::copy_n(context, tables.width, context_.data() + sample * tables.width);
+    std::copy_n(context[sample] + place * tables.width, tables.width, context_.data() + sample * tables.width);
     rows_[sample].near(place, near_.data() + sample * kNearCodes * tables.embedding);
   }
   for (size_t layer = 0; layer < tables.layers; ++layer) {

@@ -23,8 +23,9 @@ class PlaceSteps {
 
   // A frame begins: nothing of the one before is known.
   void begin();
-  // Sees the next place, after begin() the first one, whose context is [width]. Throws what Session::run() throws.
-  void see(size_t place, const float* context);
+  // Sees the next place, after begin() the first one. `context`: of each sample, [places][width]. Throws what
+  // Session::run() throws.
+  void see(size_t place, const float* const* context);
   // Logits of slice `k` of that place, [samples][entries], in memory that stays until the next call. `codes`: of each
   // sample [slices], of which those before `k` are known.
   const float* logits(size_t k, const uint16_t* const* codes);

@@ -1,0 +1,1 @@
+"""What the transformer draws of coming frames, beside the last frame and motion."""

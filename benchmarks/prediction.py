@@ -1,7 +1,7 @@
 """What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, how long a
 concealer's frames are waited for and how near the truth they are; how long surprise takes.
 
-    python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (5 minutes)
+    python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (12 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
     python -m benchmarks --only prediction                  the same as a part of the report
 
@@ -27,7 +27,8 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from benchmarks import gaps
+from benchmarks import drawn, gaps
+from benchmarks.drawn.tables import drawn_tables
 from benchmarks.gaps import FIRST_START, START_STEP, psnr_db
 from export.clips.clip import read_clip
 
@@ -37,7 +38,9 @@ BUNDLE = Path("sdk/models/prediction-int8")
 SIZE_PX, LARGE_PX = (320, 240), (640, 480)
 FRAMES = 90  # of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
-FIGURES = ("prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second", *gaps.FIGURES)
+FIGURES = (
+    "prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second", *gaps.FIGURES, *drawn.FIGURES
+)  # fmt: skip
 METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
 
 
@@ -91,7 +94,23 @@ def measure(
         figures |= gaps.figures_of(bridged)
     else:
         missing |= dict.fromkeys(gaps.FIGURES, "; ".join(absent))
+    if pushing:
+        document["drawn"], found = measure_drawn(quick, clips, threads)
+        figures |= found
+    else:
+        missing |= dict.fromkeys(drawn.FIGURES, "; ".join(absent))
     return document, figures, missing
+
+
+def measure_drawn(quick: bool, folder: Path, threads: int) -> tuple[dict, dict[str, float]]:
+    """Of the validation clips of a folder DATA/SET/val: the document, and its figures."""
+    from benchmarks.drawn import measure  # torch: not before it is needed
+
+    data, kind = folder.parent.parent, folder.parent.name
+    clips = measure.clips_of(data, kind, 2 if quick else None)
+    document, figures = measure.measure_pictures(clips, measure.real_clips(data, kind, len(clips)), BUNDLE)
+    document["times_ms"], of_times = measure.measure_times(clips, BUNDLE, threads)
+    return document, figures | of_times
 
 
 def run(words: Sequence[str], given: bytes = b"") -> str:
@@ -249,6 +268,8 @@ def section(measured: dict) -> tuple[str, list]:
         f"{surprise['network_ms']:.1f}, nearest entries {surprise['nearest_ms']:.1f} ms). How well it finds events: "
         "`python -m benchmarks.surprise`."
     )
+    if measured.get("drawn"):
+        parts += drawn_tables(measured["drawn"])
     parts += [f"Not measured: {'; '.join(measured['missing'])}."] if measured["missing"] else []
     return "Prediction", parts
 

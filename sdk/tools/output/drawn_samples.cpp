@@ -8,8 +8,8 @@
 namespace {
 
 constexpr double kLongestStep_s = 0.1;
-constexpr int64_t kMaxSteps = 64;  // of maq_predictor_draw
-constexpr float kFullRed_bits = 5;   // of a cell: most are below that
+constexpr int64_t kMaxSteps = 64;   // of maq_predictor_draw
+constexpr float kFullRed_bits = 5;  // of a cell: most are below that
 
 maquette::Predictor make_drawing(const maquette::Context& context, const SampleOptions& options, int threads) {
   maq_predictor_config config = maquette::default_predictor_config();

@@ -4,8 +4,10 @@ import maquette
 import numpy as np
 import pytest
 
+pytest.importorskip("torch", reason="the extra `train` is not installed: scripts/make-venv.sh train,dev")
+
 from benchmarks.drawn import frechet, uncertainty
-from benchmarks.drawn.__main__ import pictures_db
+from benchmarks.drawn.measure import pictures_db
 from benchmarks.drawn.times import figures_of
 
 needs_library = pytest.mark.skipif(not maquette.library_path().exists(), reason="the library is not built: make build")
@@ -71,7 +73,7 @@ def test_the_best_of_samples_is_taken_frame_by_frame():
 
 
 def test_figures_of_times():
-    times = {"1 sample": 20.0, "4 samples": 30.0, "4 passes": 10.0}
+    times = {"1 sample": 20.0, "4 passes": 10.0, "1 sample, 11 frames": 200.0, "4 samples, 11 frames": 300.0}
     assert figures_of(times) == {
         "four_samples_times": 1.5, "drawn_frames_a_second": 50.0, "passes_frames_a_second": 100.0
     }  # fmt: skip
@@ -93,3 +95,38 @@ def test_clips_go_on_by_every_method():
     assert pictures.shape == (2, continuations.MADE, 64, 64, 3)
     assert bits.shape == (2, continuations.MADE, 16, 16)
     assert not (pictures[0] == pictures[1]).all()
+
+
+@needs_library
+def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
+    import torch
+
+    from benchmarks import drawn
+    from benchmarks.drawn import continuations, measure
+    from benchmarks.drawn.tables import drawn_tables
+    from benchmarks.prediction import BUNDLE
+    from export.prediction.data import Clips
+
+    rng = np.random.default_rng(0)
+    frames = torch.from_numpy(rng.integers(0, 255, (2, 16, 64, 64, 3)).astype(np.uint8))
+    known = {name: continuations.foreseen("last") for name in ("last frame", "motion", "auto")}
+    bits = rng.random((continuations.MADE, 16, 16)).astype(np.float32)
+
+    def drawn_by(samples):
+        def go_on(shown, step_s):
+            noise = rng.integers(-9, 9, (samples, continuations.MADE, 64, 64, 3))
+            return (shown[-1] + noise).clip(0, 255).astype(np.uint8), np.stack([bits] * samples)
+
+        return go_on
+
+    known |= {"likeliest": drawn_by(1), "temperature 0.5": drawn_by(4), "temperature 1": drawn_by(16)}
+    monkeypatch.setattr(continuations, "methods", lambda bundle: known)
+    document, figures = measure.measure_pictures(
+        Clips(frames, torch.tensor([10.0, 30]), ["a", "b"]), np.empty(0), BUNDLE
+    )
+    document["times_ms"] = {"1 sample": 20.0, "4 passes": 10.0, "1 sample, 11 frames": 2.0, "4 samples, 11 frames": 3.0}
+    assert {*figures, *figures_of(document["times_ms"])} == set(drawn.FIGURES)
+    assert document["frechet"]["frames"]["last frame"] == 1
+    text = "\n".join(part if isinstance(part, str) else str(part) for part in drawn_tables(document))
+    assert "of 2 clips" in text
+    assert "'temperature 1, best of 16'" in text

@@ -72,7 +72,7 @@ void add_stored_prior(const uint8_t* bits, size_t entries, float* logits) {
 
 float largest_logit(const float* logits, size_t entries) { return largest_of(logits, entries); }
 
-void weights_of(const float* logits, size_t entries, float largest, float temperature, float* weights) {
+void likelihood_weights(const float* logits, size_t entries, float largest, float temperature, float* weights) {
   weigh(logits, entries, largest, temperature, weights);
 }
 

@@ -23,6 +23,6 @@ float largest_logit(const float* logits, size_t entries);
 
 // exp((logit - largest) / temperature) of each, at least exp(-87), the same on every processor. Neither of the numbers
 // is infinite.
-void weights_of(const float* logits, size_t entries, float largest, float temperature, float* weights);
+void likelihood_weights(const float* logits, size_t entries, float largest, float temperature, float* weights);
 
 }  // namespace maq

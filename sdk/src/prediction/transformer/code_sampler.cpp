@@ -41,7 +41,7 @@ uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   } else if (std::isinf(temperature)) {
     std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kUnbounded ? kUnit : 0.0f; });
   } else {
-    weights_of(logits, entries, largest, temperature, weights_.data());
+    likelihood_weights(logits, entries, largest, temperature, weights_.data());
     for (float& weight : weights_) weight *= kUnit;
   }
   if (settings_.top_k > 1 && settings_.top_k < entries) {

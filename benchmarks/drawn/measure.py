@@ -1,0 +1,94 @@
+"""What is drawn of coming frames: nearness to the truth, uncertainty, how real it looks, and times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from benchmarks.drawn import frechet, times, uncertainty
+from benchmarks.drawn.continuations import GIVEN, MADE, SAMPLES, went_on
+from export.clips.clip import clip_paths, read_rgb
+from export.prediction.data import Clips, read_clips
+from export.prediction.pictures.picture_error import psnr_db
+
+AHEAD = (1, 2, 4, 8, 11)  # frames, of tables
+FAR = slice(4, MADE)  # 5 to 11 frames ahead
+
+
+def psnr(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Of each picture [..., 64, 64, 3]: [...]."""
+    both = (torch.from_numpy(np.ascontiguousarray(a).reshape(-1, *a.shape[-3:])) for a in (pictures, truth))
+    return psnr_db(*both).numpy().reshape(pictures.shape[:-3])
+
+
+def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
+    """By method [clips, MADE]: of several samples the first, their mean, and the best of so many for each frame."""
+    found = {name: psnr(own[:, 0], truth) for name, own in pictures.items()}
+    for name, counts in (("temperature 0.5", (4,)), ("temperature 1", (4, 8, SAMPLES))):
+        own = pictures[name]
+        of_each = psnr(own, np.broadcast_to(truth[:, None], own.shape))
+        for count in counts:
+            found[f"{name}, mean of {count}"] = psnr(own[:, :count].mean(1, dtype=np.float32), truth)
+            found[f"{name}, best of {count}"] = of_each[:, :count].max(1)
+    half = 0.5 * (pictures["temperature 1"].mean(1, dtype=np.float32) + pictures["auto"][:, 0])
+    found[f"mean of auto and of {SAMPLES}"] = psnr(half, truth)
+    return found
+
+
+def real_clips(data: Path, kind: str, count: int) -> np.ndarray:
+    """Frames of clips to train on, as many as are compared: uint8 [clips, MADE, 64, 64, 3]; spread over all."""
+    paths = clip_paths(data, kind, "train")
+    chosen = [paths[k] for k in np.linspace(0, len(paths) - 1, count).astype(int)] if paths else []
+    return np.stack([read_rgb(path)[0][GIVEN : GIVEN + MADE] for path in chosen]) if chosen else np.empty(0)
+
+
+def frechet_ratios(pictures: dict[str, np.ndarray], truth: np.ndarray, others: np.ndarray) -> dict[str, dict]:
+    """By kind of features, by method: the distance from the true clips as a share of the last frame's."""
+    network = frechet.FrameFeatures()
+    shown = {name: network.of(own[:, 0]) for name, own in pictures.items()}
+    if len(others):
+        shown["other real clips"] = network.of(others)
+    real, found = network.of(truth), {}
+    for name, of in (("frames", frechet.stills), ("changes", frechet.changes)):
+        distances = {method: frechet.frechet_distance(of(real), of(own)) for method, own in shown.items()}
+        found[name] = {method: own / distances["last frame"] for method, own in distances.items()}
+        found[name]["last frame, distance"] = distances["last frame"]
+    return found
+
+
+def clips_of(data: Path, kind: str, count: int | None) -> Clips:
+    """At most so many validation clips. Raises SystemExit where there are none."""
+    clips = read_clips(data, [kind], "val")
+    count = min(count or len(clips), len(clips))
+    return Clips(clips.frames[:count], clips.fps[:count], clips.names[:count])
+
+
+def measure_pictures(clips: Clips, others: np.ndarray, bundle: Path) -> tuple[dict, dict[str, float]]:
+    """The document, and the figures but those of times. others: real clips, of real_clips()."""
+    truth = clips.frames[:, GIVEN : GIVEN + MADE].numpy()
+    pictures, bits = went_on(clips, bundle)
+    decibels = pictures_db(pictures, truth)
+    document: dict = {"clips": len(clips), "given": GIVEN, "made": MADE, "ahead": list(AHEAD)}
+    document |= {"psnr_db": {}, "rank": {}, "reliability": {}}
+    for name, own in decibels.items():
+        document["psnr_db"][name] = [float(own[:, k - 1].mean()) for k in AHEAD]
+    better = np.maximum(decibels["last frame"].mean(0), decibels["motion"].mean(0))
+    figures = {"drawn_mean_gain_db": float((decibels["temperature 1, mean of 8"].mean(0) - better)[FAR].mean())}
+    for name in ("likeliest", "temperature 1"):
+        uncertain = bits[name].mean(1)
+        errors = uncertainty.cell_errors(pictures[name].mean(1, dtype=np.float32), truth)
+        each = uncertainty.by_frame(uncertain, errors)
+        document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]
+        document["reliability"][name] = uncertainty.reliability(uncertain, errors)
+    figures["uncertainty_rank"] = document["rank"]["temperature 1"][-1]
+    document["frechet"] = frechet_ratios(pictures, truth, others)
+    figures["drawn_frechet_ratio"] = document["frechet"]["changes"]["temperature 1"]
+    return document, figures
+
+
+def measure_times(clips: Clips, bundle: Path, threads: int) -> tuple[dict[str, float], dict[str, float]]:
+    """Milliseconds by case, and their figures."""
+    found = times.times_ms(bundle, clips.frames[0].numpy(), 1 / float(clips.fps[0]), threads)
+    return found, times.figures_of(found)

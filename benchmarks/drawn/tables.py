@@ -1,0 +1,39 @@
+"""What was measured of drawn frames, as sentences and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+Table = list[list[str]]
+
+
+def drawn_tables(document: dict) -> list[str | Table]:
+    """Sentences and tables of a document of measure_pictures(), and of times under "times_ms"."""
+    ahead = [str(k) for k in document["ahead"]]
+    ratios = document["frechet"]
+    parts: list[str | Table] = [
+        f"Drawn by the transformer: {document['given']} frames given of each of {document['clips']} clips of pushing, "
+        f"{document['made']} made, 64 x 64. PSNR in dB by frames ahead; best: of so many samples for each frame.",
+        _table(["", *ahead], document["psnr_db"], 2),
+        "Rank correlation (Spearman) of the bits and the error of the cells of a frame, by frames ahead.",
+        _table(["", *ahead, "all"], document["rank"], 2),
+        "Fifths of all cells, from the surest on: bits of a code, and error in grey levels (root mean square).",
+        [["", "surest", "", "", "", "least sure"]]
+        + [
+            [name, *(f"{bits:.2f}: {error:.1f}" for bits, error in rows)]
+            for name, rows in document["reliability"].items()
+        ],
+        "Fréchet distance from the true clips as a ratio of the last frame's, by the detector's features of frames, "
+        "and by their changes from frame to frame. It is no FVD, whose network is not free.",
+        _table(
+            ["", *ratios], {name: [own[name] for own in ratios.values()] for name in next(iter(ratios.values()))}, 2
+        ),
+    ]
+    if "times_ms" in document:
+        parts.append("Times of draws, ms.")
+        parts.append(_table(["", "ms"], {name: [own] for name, own in document["times_ms"].items()}, 1))
+    return parts
+
+
+def _table(title: list[str], rows: dict[str, Sequence[float]], digits: int) -> Table:
+    return [title, *([name, *(f"{value:.{digits}f}" for value in own)] for name, own in rows.items())]

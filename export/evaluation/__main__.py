@@ -61,6 +61,10 @@ def main(argv: list[str] | None = None) -> int:
         "--score-floor", type=float, default=0.05, metavar="S",
         help="lowest score that enters AP (default 0.05)",
     )  # fmt: skip
+    parser.add_argument(
+        "--roll", type=float, metavar="DEGREES",
+        help="turn rendered images by so much, on a square that holds any turn; compare with --roll 0",
+    )  # fmt: skip
     Workers.add_arguments(parser, processes=0)
     parser.add_argument(
         "--out", type=Path, default=Path("build/evaluation"), metavar="DIR",
@@ -91,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         name = report.column_name(backend.kind, backend.precision)
         if name in results:
             name = f"{name} ({backend.path.name})"
-        ranges = image_ranges(text, arguments.score_floor, paths, arguments.limit)
+        ranges = image_ranges(text, arguments.score_floor, paths, arguments.limit, arguments.roll)
         results[name] = measure(ranges, table, Workers.of(arguments))
         if photo_set.photos:
             photo_results[name] = photos.measure(backend, photo_set)
@@ -106,6 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(f"No real photographs: {arguments.labels} has no labels (python -m export.teachers makes them).")
     data = {"folder": str(arguments.data), "shards": len(paths), "images": total, "limit": arguments.limit,
+            "roll": arguments.roll,
             "score_floor": arguments.score_floor,
             "photos": [str(folder) for folder in arguments.photos],
             "empty": [str(folder) for folder in arguments.empty],

@@ -16,6 +16,7 @@ from export.evaluation.breakdown import GroupFigures, breakdown, left_right
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.people import FalseAlarm, PersonRecord, compare, rendered_people
+from export.evaluation.rolled import rolled
 from export.evaluation.surface_accuracy import PixelAccuracy, PointAccuracy, SurfaceTable, fraction, mask_overlap
 from export.jobs import Workers, results
 from export.shards import LabelledImage, count_images, read_images
@@ -158,16 +159,20 @@ class Tally:
 
 @dataclass(frozen=True)
 class ImageRange:
-    """Images `first` to `first + count` of a shard, for one backend (as for `open_backend`)."""
+    """Images `first` to `first + count` of a shard, for one backend (as for `open_backend`). roll: degrees by which
+    each is turned (`rolled`); None: shown as it is."""
 
     backend: str
     score_floor: float
     shard: Path
     first: int
     count: int
+    roll: float | None = None
 
 
-def image_ranges(backend: str, score_floor: float, paths: list[Path], limit: int | None = None) -> list[ImageRange]:
+def image_ranges(
+    backend: str, score_floor: float, paths: list[Path], limit: int | None = None, roll: float | None = None
+) -> list[ImageRange]:
     """The first `limit` images of the shards, in ranges that one worker does in half a minute or so."""
     ranges = []
     left = np.inf if limit is None else limit
@@ -175,7 +180,7 @@ def image_ranges(backend: str, score_floor: float, paths: list[Path], limit: int
         images = min(count_images([path]), left)
         for first in range(0, int(images), IMAGES_A_JOB):
             count = int(min(IMAGES_A_JOB, images - first))
-            ranges.append(ImageRange(backend, score_floor, path, first, count))
+            ranges.append(ImageRange(backend, score_floor, path, first, count, roll))
         left -= images
     return ranges
 
@@ -198,7 +203,7 @@ def _tally(images: ImageRange) -> Tally:
     backend = _backend(images.backend, images.score_floor)
     tally = Tally(backend.threshold)
     for image in read_images([images.shard], first=images.first, limit=images.count):
-        tally.add(backend, image)
+        tally.add(backend, image if images.roll is None else rolled(image, images.roll))
     return tally
 
 

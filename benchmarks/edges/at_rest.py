@@ -17,10 +17,10 @@ import numpy as np
 from tqdm import tqdm
 
 from benchmarks.edges.curves import frames_of, truth_of
+from benchmarks.edges.edges_api import Edges, Pinhole
 from benchmarks.edges.measure import BUNDLE, SOLIDS, WIDTH_PX
 from export.edges.data import read_frames, seen_by
 from export.edges.metrics import frame_figures
-from export.evaluation.edges_api import Edges, Pinhole
 from export.solids.sensors import LEVELS
 
 FRAMES = (1, 4, 16)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.edges.edges_api import LINE, Curves
 from benchmarks.edges.views import View, polyline
 from export.edges.curve_metrics import score
-from export.evaluation.edges_api import LINE, Curves
 
 MIN_LINE_R = 20.0  # shorter lines have no angle to speak of
 SAME_LINE_R = 3.0  # from a found line's middle to the true line that it is compared with

@@ -16,13 +16,13 @@ from tqdm import tqdm
 
 from benchmarks.edges import planes
 from benchmarks.edges.curve_scores import line_angle_deg, view_score, with_f_score
+from benchmarks.edges.edges_api import Curves, Edges, Pinhole, depth_frames
 from benchmarks.edges.methods import SHIPPED
 from benchmarks.edges.planes import Planes
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.speed import SCENES, SMALL_PX
 from benchmarks.edges.views import View
 from export.edges.curve_metrics import score
-from export.evaluation.edges_api import Curves, Edges, Pinhole, depth_frames
 
 TRUTH = Path("build/release/benchmarks/native/print_solids_truth")
 TUNING_VIEWS = 16  # validation views that the planes' threshold is chosen on

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from tqdm import tqdm
 
+from benchmarks.edges.edges_api import Edges, EdgesResult, Pinhole
 from benchmarks.edges.fusion_api import Fusion
 from benchmarks.edges.fusion_memory import in_child
 from benchmarks.edges.quality import LEVELS
@@ -25,7 +26,6 @@ from export.edges.curve_metrics import score
 from export.edges.data import seen_by
 from export.edges.fusion import FieldView
 from export.edges.judged_pixels import JudgedPixels, judged_pixels
-from export.evaluation.edges_api import Edges, EdgesResult, Pinhole
 from export.solids import sensors
 
 if TYPE_CHECKING:

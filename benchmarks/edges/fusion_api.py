@@ -10,8 +10,8 @@ from typing import Any
 import maquette
 import numpy as np
 
+from benchmarks.edges.edges_api import Curves, Edges, EdgesResult
 from export.camera import Camera
-from export.evaluation.edges_api import Curves, Edges, EdgesResult
 
 
 class Fusion:

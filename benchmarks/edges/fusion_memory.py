@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.edges.edges_api import Edges, Pinhole
 from benchmarks.edges.fusion_api import Fusion
 from export.camera import Camera
-from export.evaluation.edges_api import Edges, Pinhole
 
 
 def in_child(

@@ -32,6 +32,7 @@ from benchmarks.edges import (
     true_fields,
     voronoi,
 )  # fmt: skip
+from benchmarks.edges.edges_api import Edges
 from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
@@ -39,7 +40,6 @@ from export.bundle import BundleInfo
 from export.edges.bundle import write_manifest
 from export.edges.export_onnx import export
 from export.edges.weights import load_network
-from export.evaluation.edges_api import Edges
 from export.solids.sensors import LEVELS
 
 SOLIDS, BUNDLE, WEIGHTS = Path(".data/solids"), Path("sdk/models/edges-int8"), Path("export/weights/edges.pt")

@@ -12,12 +12,12 @@ from typing import Protocol
 import numpy as np
 
 from benchmarks.edges import rivals
+from benchmarks.edges.edges_api import Edges, EdgesResult, Pinhole
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R
 from export.edges.losses import DECODINGS
 from export.edges.validation import field_of
 from export.edges.weights import load_network
-from export.evaluation.edges_api import Edges, EdgesResult, Pinhole
 
 SHIPPED, FLOAT, NOTHING = "int8, as shipped", "fp32, the same weights", "no edges anywhere"
 

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 
 from benchmarks.edges.curve_scores import view_score
+from benchmarks.edges.edges_api import LINE, Curves, Pinhole
 from benchmarks.edges.rivals import normals_of
 from benchmarks.edges.views import View, camera_points
-from export.evaluation.edges_api import LINE, Curves, Pinhole
 
 THRESHOLDS_R = (0.5, 1.0, 2.0, 4.0)  # of a point from its plane, tried on validation views; r of the median depth
 BLOCK_PX, MIN_BLOCKS = 10, 4  # of the blocks that planes grow from

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from benchmarks.edges.edges_api import Edges, Pinhole
 from export.depth_frames.sheet import false_positives
 from export.edges.data import frame_of
-from export.evaluation.edges_api import Edges, Pinhole
 from export.solids.records import RecordError, read_records
 
 FIGURE = "edges_round_percent"

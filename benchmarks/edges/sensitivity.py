@@ -16,9 +16,9 @@ from tqdm import tqdm
 
 from benchmarks.edges.curve_scores import view_score
 from benchmarks.edges.curves import with_curves
+from benchmarks.edges.edges_api import Curves, Edges
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.views import View
-from export.evaluation.edges_api import Curves, Edges
 
 VIEWS = 24  # of validation, evenly
 FACTORS = (0.5, 1.0, 2.0)

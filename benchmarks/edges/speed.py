@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from benchmarks.edges.edges_api import Edges, Pinhole, depth_frames
 from benchmarks.edges.methods import SHIPPED, Method
 from benchmarks.edges.quality import LEVELS, of_pixels
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R
-from export.evaluation.edges_api import Edges, Pinhole, depth_frames
 
 FULL_PX = 640, 480
 SIZES = (640, 320, 160)  # widths that frames of FULL_PX are reduced to

@@ -16,10 +16,10 @@ from tqdm import tqdm
 from benchmarks.edge_curves import PROGRAM, extracted, pack_field
 from benchmarks.edges.curve_scores import view_score
 from benchmarks.edges.curves import mean_of, with_curves
+from benchmarks.edges.edges_api import TYPES, Curves
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R
-from export.evaluation.edges_api import TYPES, Curves
 
 FIGURE = "edges_curves_true"
 

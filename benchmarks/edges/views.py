@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.edges.edges_api import Pinhole
 from benchmarks.edges.rivals import points_of
 from export.edges.config import SHARP_R
 from export.edges.curve_metrics import STEP_R, places_on
 from export.edges.data import Frame, RecordError, frame_of
 from export.edges.validation import frame_through
-from export.evaluation.edges_api import Pinhole
 from export.solids.records import read_records
 
 ARC_STEP_RAD = np.radians(3.0)

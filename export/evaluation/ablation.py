@@ -82,6 +82,15 @@ VARIATIONS = {
     "v3": Variation("MobileNetV3-Large from random weights", pretrained=False, backbone="mobilenet_v3_large"),
     "photos": Variation("a third of the images photographs: masks, regions, fitted bodies", photos="ablation"),
     "photos-unfitted": Variation("a third photographs: masks and regions alone", photos="ablation-unfitted"),
+    "usual": Variation(
+        "renderings as photographs show people, a third photographs, hands by wrist and knuckles",
+        rendered="people-usual",
+        photos="ablation",
+    ),
+    "usual-hands": Variation("the same with outlines of hands", rendered="people-usual", photos="ablation-hands"),
+    "usual-consistent": Variation(
+        "the same and labels by consistency", rendered="people-usual", photos="ablation-consistent"
+    ),
     "few": Variation("3,000 rendered images", count=3000),
     "fewer": Variation("1,000 rendered images", count=1000),
     "bare": Variation("3,000 rendered images without clothes", rendered="people-bare", count=3000),
@@ -200,10 +209,17 @@ def prepare(folder: Path) -> None:
             link = half / f"{photo.name}.jpg"
             if not link.exists():
                 link.symlink_to((photos / "train" / link.name).resolve())
-    for name, fits in (("ablation", folder / "teachers" / "fits"), ("ablation-unfitted", folder / "nothing")):
-        wanted = {"photos": photos / "ablation" / "train", "labels": folder / "teachers" / "labels", "fits": fits,
+    fits, nothing = str(folder / "teachers" / "fits"), str(folder / "nothing")
+    weights = ["export/weights/densepose-b.pt", "export/weights/densepose-b-crops.pt"]
+    for name, differing in (
+        ("ablation", ["--no-hands", "--fits", fits]),
+        ("ablation-unfitted", ["--no-hands", "--fits", nothing]),
+        ("ablation-hands", ["--fits", fits]),
+        ("ablation-consistent", ["--fits", fits, "--consistent", *weights]),
+    ):
+        wanted = {"photos": photos / "ablation" / "train", "labels": folder / "teachers" / "labels",
                   "empty": folder / "backgrounds" / "train", "out": photos / "shards" / name}  # fmt: skip
-        if shards.main([text for key, value in wanted.items() for text in (f"--{key}", str(value))]):
+        if shards.main([*(text for key, value in wanted.items() for text in (f"--{key}", str(value))), *differing]):
             raise SystemExit(1)
 
 

@@ -241,6 +241,10 @@ def main(argv: list[str] | None = None) -> int:
         help="weights.pt of trainings: what they agree on about people seen large completes the labels",
     )  # fmt: skip
     parser.add_argument(
+        "--hands", action=argparse.BooleanOptionalAction, default=True,
+        help="outlines of hands by a network of their own (default), or by wrists and knuckles alone",
+    )  # fmt: skip
+    parser.add_argument(
         "--empty", type=Path, nargs="+", default=[Path(".data/backgrounds/train")], metavar="DIR",
         help="photographs without people",
     )  # fmt: skip
@@ -262,14 +266,14 @@ def main(argv: list[str] | None = None) -> int:
               f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
         return 1
     pictures, fitted, seen_hands = [], 0, 0
-    hand_network = HandNetwork()
+    hand_network = HandNetwork() if arguments.hands else None
     consensus = Consensus.of_files(arguments.consistent) if arguments.consistent else None
     for path, labels in tqdm(photos, desc="labels", unit="photo", disable=None):
         image = read(path)
         fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
         fitted += 0 if fits is None else int(fits.accepted.sum())
         told = PhotoLabels.load(labels)
-        hands = hands_of(hand_network, image, told)
+        hands = hands_of(hand_network, image, told) if hand_network else {}
         seen_hands += len(hands)
         label = weak_label(told, image.shape[:2], fits, hands)
         if consensus:

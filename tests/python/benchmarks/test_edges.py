@@ -11,10 +11,10 @@ from benchmarks import __main__ as benchmark
 from benchmarks import gates
 from benchmarks.edges import curve_scores, curves, planes, quality, rivals, section, speed, true_fields
 from benchmarks.edges import measure as edges
+from benchmarks.edges.edges_api import LINE, SPLINE, Curves, Edges, Pinhole, depth_frames
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
 from benchmarks.edges.views import View, bending_radius_r, bins, incidence_deg, polyline, read_views
 from export.edges.data import Frame
-from export.evaluation.edges_api import LINE, SPLINE, Curves, Edges, Pinhole, depth_frames
 from export.solids.records import packed, write_shard
 
 WIDTH, HEIGHT, FOCAL_PX = 96, 72, 90.0

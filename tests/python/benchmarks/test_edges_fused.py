@@ -10,13 +10,13 @@ import pytest
 from maquette.fusion import POINT
 
 from benchmarks.edges import fused, fusion_memory, section_of_views
+from benchmarks.edges.edges_api import Edges, Pinhole
 from benchmarks.edges.fusion_api import Fusion
 from benchmarks.edges.measure import BUNDLE
 from export.camera import Camera
 from export.edges.config import EPS_R
 from export.edges.fusion import FieldView
 from export.edges.judged_pixels import STEP_PX, judged_pixels
-from export.evaluation.edges_api import Edges, Pinhole
 
 WIDTH, HEIGHT, FOCAL_PX = 64, 48, 60.0
 R_M = 1 / FOCAL_PX  # of a wall at 1 m

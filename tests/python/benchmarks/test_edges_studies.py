@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.edges import quality, section, sensitivity, voronoi
+from benchmarks.edges.edges_api import Edges, Pinhole
 from benchmarks.edges.measure import BUNDLE
 from benchmarks.edges.rivals import tuned
-from export.evaluation.edges_api import Edges, Pinhole
 
 HEIGHT, WIDTH, FOCAL_PX = 72, 96, 100.0
 pytestmark = pytest.mark.usefixtures("one_thread")

@@ -2,6 +2,7 @@
 
     python -m benchmarks.drawn                   validation clips of pushing, 5 frames given, 11 made (10 minutes)
     python -m benchmarks.drawn --clips 4         fewer clips, to see that it runs
+    python -m benchmarks.drawn --real            parts of real clips at 320 x 240 instead, with 4 samples
     python -m benchmarks.drawn --times           how long drawing takes, on a quiet machine; nothing else
 
 Needs clips of `export.clips` (.data/clips/pushing/val; for the distance of real clips from one another, train too) and
@@ -14,7 +15,9 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.drawn.measure import clips_of, measure_pictures, measure_times, real_clips
+import numpy as np
+
+from benchmarks.drawn.measure import clips_of, filmed, measure_pictures, measure_times, real_clips
 from benchmarks.drawn.tables import drawn_tables
 from benchmarks.prediction import BUNDLE
 
@@ -27,17 +30,24 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--set", default="pushing", help="default %(default)s")
     parser.add_argument("--clips", type=int, help="at most so many; default: all")
+    parser.add_argument("--real", action="store_true")
+    parser.add_argument("--photos", type=Path, default=Path(".data/photos/clip"), help="folder of real clips")
     parser.add_argument("--times", action="store_true")
     parser.add_argument("--threads", type=int, default=1, help="with --times (default %(default)s)")
     options = parser.parse_args()
-    clips = clips_of(options.data, options.set, options.clips)
+    clips = (
+        filmed(options.photos, options.clips) if options.real else clips_of(options.data, options.set, options.clips)
+    )
     if options.times:
         found, figures = measure_times(clips, options.bundle, options.threads)
         for name, own in found.items():
             print(f"{name} | {own:.1f} ms")
     else:
-        others = real_clips(options.data, options.set, len(clips))
-        document, figures = measure_pictures(clips, others, options.bundle)
+        if options.real:
+            document, figures = measure_pictures(clips, np.empty(0), options.bundle, samples=4)
+        else:
+            others = real_clips(options.data, options.set, len(clips))
+            document, figures = measure_pictures(clips, others, options.bundle)
         for part in drawn_tables(document):
             print(part if isinstance(part, str) else "\n".join(" | ".join(row) for row in part) + "\n")
     print(json.dumps(figures))

@@ -1,4 +1,4 @@
-"""Clips that go on from their first frames by each method, at 64 x 64."""
+"""Clips that go on from their first frames by each method."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SAMPLES = 16
 DRAWN = 3  # MAQ_NETWORK_DRAWN
 SEED = 1
 
-# Frames of a clip [GIVEN, 64, 64, 3], seconds between them -> pictures [samples, MADE, 64, 64, 3], and bits of their
-# cells [samples, MADE, 16, 16] or None.
+# Frames of a clip [GIVEN, H, W, 3], seconds between them -> pictures [samples, MADE, H, W, 3], and bits of their cells
+# [samples, MADE, 16, 16] or None.
 Method = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray | None]]
 
 
@@ -55,7 +55,7 @@ def drawn(samples: int, bundle: Path, **settings: float) -> Method:
     return go_on
 
 
-def methods(bundle: Path) -> dict[str, Method]:
+def methods(bundle: Path, samples: int) -> dict[str, Method]:
     return {
         "last frame": foreseen("last"),
         "motion": foreseen("motion"),
@@ -64,16 +64,16 @@ def methods(bundle: Path) -> dict[str, Method]:
         "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
         "likeliest, 4 passes": drawn(1, bundle, temperature=0, passes=4),
         "temperature 0.5": drawn(4, bundle, temperature=0.5),
-        "temperature 1": drawn(SAMPLES, bundle, temperature=1),
+        "temperature 1": drawn(samples, bundle, temperature=1),
     }
 
 
-def went_on(clips: Clips, bundle: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """By method: pictures uint8 [clips, samples, MADE, 64, 64, 3], and where there are some bits of cells [clips,
+def went_on(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """By method: pictures uint8 [clips, samples, MADE, H, W, 3], and where there are some bits of cells [clips,
     samples, MADE, 16, 16]."""
     pictures: dict[str, list[np.ndarray]] = {}
     bits: dict[str, list[np.ndarray]] = {}
-    known = methods(bundle)
+    known = methods(bundle, samples)
     for frames, fps in tqdm(zip(clips.frames.numpy(), clips.fps.numpy(), strict=True), total=len(clips), disable=None):
         for name, go_on in known.items():
             made, uncertain = go_on(frames[:GIVEN], 1 / float(fps))

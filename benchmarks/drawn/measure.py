@@ -9,6 +9,7 @@ import torch
 
 from benchmarks.drawn import frechet, times, uncertainty
 from benchmarks.drawn.continuations import GIVEN, MADE, SAMPLES, went_on
+from benchmarks.prediction import SIZE_PX, real_films
 from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
 from export.prediction.pictures.picture_error import psnr_db
@@ -18,7 +19,7 @@ FAR = slice(4, MADE)  # 5 to 11 frames ahead
 
 
 def psnr(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Of each picture [..., 64, 64, 3]: [...]."""
+    """Of each picture [..., H, W, 3]: [...]."""
     both = (torch.from_numpy(np.ascontiguousarray(a).reshape(-1, *a.shape[-3:])) for a in (pictures, truth))
     return psnr_db(*both).numpy().reshape(pictures.shape[:-3])
 
@@ -26,14 +27,15 @@ def psnr(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
 def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
     """By method [clips, MADE]: of several samples the first, their mean, and the best of so many for each frame."""
     found = {name: psnr(own[:, 0], truth) for name, own in pictures.items()}
-    for name, counts in (("temperature 0.5", (4,)), ("temperature 1", (4, 8, SAMPLES))):
+    samples = pictures["temperature 1"].shape[1]
+    for name in ("temperature 0.5", "temperature 1"):
         own = pictures[name]
-        of_each = psnr(own, np.broadcast_to(truth[:, None], own.shape))
-        for count in counts:
+        of_each = np.stack([psnr(own[:, s], truth) for s in range(own.shape[1])], 1)
+        for count in [count for count in (4, 8, SAMPLES) if count <= own.shape[1]]:
             found[f"{name}, mean of {count}"] = psnr(own[:, :count].mean(1, dtype=np.float32), truth)
             found[f"{name}, best of {count}"] = of_each[:, :count].max(1)
     half = 0.5 * (pictures["temperature 1"].mean(1, dtype=np.float32) + pictures["auto"][:, 0])
-    found[f"mean of auto and of {SAMPLES}"] = psnr(half, truth)
+    found[f"mean of auto and of {samples}"] = psnr(half, truth)
     return found
 
 
@@ -65,24 +67,57 @@ def clips_of(data: Path, kind: str, count: int | None) -> Clips:
     return Clips(clips.frames[:count], clips.fps[:count], clips.names[:count])
 
 
-def measure_pictures(clips: Clips, others: np.ndarray, bundle: Path) -> tuple[dict, dict[str, float]]:
+def filmed(photos: Path, count: int | None) -> Clips:
+    """Parts of real clips at 320 x 240, 10 frames a second, one after another, at most so many. Raises SystemExit
+    where there are none."""
+    parts = []
+    for film in real_films(photos, SIZE_PX, quick=True):
+        rgb = np.ascontiguousarray(film.bgr[..., ::-1])
+        parts += [(rgb[at : at + GIVEN + MADE], film.fps, film.name) for at in range(0, len(rgb) - GIVEN - MADE, 16)]
+    if not parts:
+        raise SystemExit(f"{photos} has no clips: python -m export.photos people")
+    frames, fps, names = zip(*parts[:count], strict=True)
+    return Clips(torch.from_numpy(np.stack(frames)), torch.tensor(fps), list(names))
+
+
+def uncertainties(clips: Clips, pictures: dict[str, np.ndarray], bits: dict[str, np.ndarray]) -> dict[str, tuple]:
+    """What says how uncertain a cell is, and the cell's error, by what is compared: [clips, MADE, 16, 16] twice."""
+    given, truth = (part.numpy() for part in clips.frames[:, : GIVEN + MADE].split((GIVEN, MADE), 1))
+    drawn = bits["temperature 1"].mean(1)
+    changed = np.broadcast_to(uncertainty.cell_errors(given[:, -2:-1], given[:, -1:]), drawn.shape)
+    mean = uncertainty.cell_errors(pictures["temperature 1"].mean(1, dtype=np.float32), truth)
+    of_auto = uncertainty.cell_errors(pictures["auto"][:, 0], truth)
+    return {
+        "likeliest, its bits": (
+            bits["likeliest"][:, 0],
+            uncertainty.cell_errors(pictures["likeliest"][:, 0], truth),
+        ),
+        "mean of samples, their bits": (drawn, mean),
+        "mean of samples, what changed last": (changed, mean),
+        "auto, bits of samples": (drawn, of_auto),
+        "auto, what changed last": (changed, of_auto),
+    }
+
+
+def measure_pictures(
+    clips: Clips, others: np.ndarray, bundle: Path, samples: int = SAMPLES
+) -> tuple[dict, dict[str, float]]:
     """The document, and the figures but those of times. others: real clips, of real_clips()."""
     truth = clips.frames[:, GIVEN : GIVEN + MADE].numpy()
-    pictures, bits = went_on(clips, bundle)
+    pictures, bits = went_on(clips, bundle, samples)
     decibels = pictures_db(pictures, truth)
     document: dict = {"clips": len(clips), "given": GIVEN, "made": MADE, "ahead": list(AHEAD)}
     document |= {"psnr_db": {}, "rank": {}, "reliability": {}}
     for name, own in decibels.items():
         document["psnr_db"][name] = [float(own[:, k - 1].mean()) for k in AHEAD]
     better = np.maximum(decibels["last frame"].mean(0), decibels["motion"].mean(0))
-    figures = {"drawn_mean_gain_db": float((decibels["temperature 1, mean of 8"].mean(0) - better)[FAR].mean())}
-    for name in ("likeliest", "temperature 1"):
-        uncertain = bits[name].mean(1)
-        errors = uncertainty.cell_errors(pictures[name].mean(1, dtype=np.float32), truth)
+    most = f"temperature 1, mean of {min(samples, 8)}"
+    figures = {"drawn_mean_gain_db": float((decibels[most].mean(0) - better)[FAR].mean())}
+    for name, (uncertain, errors) in uncertainties(clips, pictures, bits).items():
         each = uncertainty.by_frame(uncertain, errors)
         document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]
         document["reliability"][name] = uncertainty.reliability(uncertain, errors)
-    figures["uncertainty_rank"] = document["rank"]["temperature 1"][-1]
+    figures["uncertainty_rank"] = document["rank"]["mean of samples, their bits"][-1]
     document["frechet"] = frechet_ratios(pictures, truth, others)
     figures["drawn_frechet_ratio"] = document["frechet"]["changes"]["temperature 1"]
     return document, figures

@@ -12,12 +12,14 @@ def drawn_tables(document: dict) -> list[str | Table]:
     ahead = [str(k) for k in document["ahead"]]
     ratios = document["frechet"]
     parts: list[str | Table] = [
-        f"Drawn by the transformer: {document['given']} frames given of each of {document['clips']} clips of pushing, "
-        f"{document['made']} made, 64 x 64. PSNR in dB by frames ahead; best: of so many samples for each frame.",
+        f"Drawn by the transformer: {document['given']} frames given of each of {document['clips']} clips, "
+        f"{document['made']} made. PSNR in dB by frames ahead; best: of so many samples for each frame.",
         _table(["", *ahead], document["psnr_db"], 2),
-        "Rank correlation (Spearman) of the bits and the error of the cells of a frame, by frames ahead.",
+        "Rank correlation (Spearman) of what says how uncertain the cells of a frame are, and of their error, by "
+        "frames ahead.",
         _table(["", *ahead, "all"], document["rank"], 2),
-        "Fifths of all cells, from the surest on: bits of a code, and error in grey levels (root mean square).",
+        "Fifths of all cells, from the surest on: bits of a code (or change in grey levels), and error in grey levels "
+        "(root mean square).",
         [["", "surest", "", "", "", "least sure"]]
         + [
             [name, *(f"{bits:.2f}: {error:.1f}" for bits, error in rows)]

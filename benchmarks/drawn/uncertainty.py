@@ -8,10 +8,12 @@ CELLS = 16  # a side
 
 
 def cell_errors(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Root of the mean squared error of each cell, grey levels: [..., 64, 64, 3] -> [..., 16, 16]."""
+    """Root of the mean squared error of each cell, grey levels: [..., H, W, 3] -> [..., 16, 16]; of what does not
+    divide into cells the rest is left out."""
     square = (pictures.astype(np.float32) - truth.astype(np.float32)) ** 2
-    size = square.shape[-2] // CELLS
-    parts = square.reshape(*square.shape[:-3], CELLS, size, CELLS, size, 3)
+    high, wide = square.shape[-3] // CELLS, square.shape[-2] // CELLS
+    square = square[..., : CELLS * high, : CELLS * wide, :]
+    parts = square.reshape(*square.shape[:-3], CELLS, high, CELLS, wide, 3)
     return np.sqrt(parts.mean((-4, -2, -1)))
 
 

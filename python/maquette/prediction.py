@@ -22,13 +22,15 @@ class Predictor(NativeObject):
 
     method: "motion" (everything moves on as it moved), "last" (the last frame), "auto": both mixed, place by place, by
     how right each was about the frames that have come, or "network": that, changed by what networks foresee (not in
-    every bundle). settings: fields of maq_predictor_config by their names. It sees pictures, not the world: never steer
+    every bundle). networks_of: another one of that method, whose networks this one uses as well. settings: fields of
+    maq_predictor_config by their names. It sees pictures, not the world: never steer
     anything by what it made up.
     """
 
-    def __init__(self, method: str = "auto", **settings: Any) -> None:
+    def __init__(self, method: str = "auto", networks_of: Predictor | None = None, **settings: Any) -> None:
         n = native()
-        config = n.config("maq_predictor_config", {"method": _method(method), **settings})
+        shared = {} if networks_of is None else {"networks_of": networks_of.handle}
+        config = n.config("maq_predictor_config", {"method": _method(method)} | shared | settings)
         super().__init__(n.create("maq_predictor", n.context, config))
 
     def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> None:
@@ -48,7 +50,7 @@ class Predictor(NativeObject):
         return Frame.of_handle(made)
 
     def draw(self, samples: int, frames: int, step_s: float) -> None:
-        """Draws `samples` (1 to 16) of what the stream may show, each `frames` (1 to 64) frames, `step_s` (to 0.1)
+        """Draws `samples` (1 to 16) of what the stream may show, each `frames` (1 to 64) frames, `step_s` (to 0.125)
         apart: of method "network", network_mode=3 (MAQ_NETWORK_DRAWN), by its temperature, top_k, seed and passes. A
         sample is the same however many others are drawn. Until the next push, prediction or draw `drawn` and
         `uncertainty` give what was drawn. Raises MaquetteError."""

@@ -49,6 +49,10 @@ typedef struct maq_predictor_config {
   uint32_t passes; /* of codes that are drawn: 0 (default) draws one after another, exactly by the probabilities; 1 to
                       16 all of a frame at once, at most so many times, each time after those of the time before:
                       quicker, and the same where that settles */
+  const maq_predictor* networks_of; /* another predictor with networks, whose networks and mode this one uses as well:
+                                       it takes little memory then, and networks of both run one after the other; what
+                                       is said of bundle and network_mode is not read. The other may be destroyed first.
+                                       NULL (default): own networks */
 } maq_predictor_config;
 
 /* Times of the latest push and prediction, in wall-clock milliseconds, and counts since the predictor was made. */
@@ -106,13 +110,13 @@ MAQ_API maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame*
 MAQ_API maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_frame** frame);
 
 /* Draws `sample_count` (1 to 16) of what the stream may show, each `frame_count` (1 to 64) frames, `step_s` apart:
- * above 0, at most 0.1, and 10 in all. Of a predictor with MAQ_PREDICTION_NETWORK that draws codes, by its temperature,
- * top_k, seed and passes. A sample goes on from its own frames, and is the same however many others and frames are
- * drawn; the same call after the same frames draws the same. While nothing moves all of them are the last frame. They
- * are known until the next push, prediction, draw or reset. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also
- * before the first frame), MAQ_ERROR_UNSUPPORTED (a predictor that does not draw), MAQ_ERROR_INFERENCE. Blocks while
- * networks run: a frame of a sample takes as long as maq_predictor_predict does with them, of more samples at once
- * less. */
+ * above 0, at most 0.125 (networks know steps up to 0.1; the nearest is taken). Of a predictor with
+ * MAQ_PREDICTION_NETWORK that draws codes, by its temperature, top_k, seed and passes. A sample goes on from its own
+ * frames, and is the same however many others and frames are drawn; the same call after the same frames draws the same.
+ * While nothing moves all of them are the last frame. They are known until the next push, prediction, draw or reset.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_UNSUPPORTED (a predictor
+ * that does not draw), MAQ_ERROR_INFERENCE. Blocks while networks run: each frame of a sample takes as long as one that
+ * maq_predictor_predict draws, of several samples at once less. */
 MAQ_API maq_status maq_predictor_draw(maq_predictor* predictor, uint32_t sample_count, uint32_t frame_count,
                                       double step_s);
 

@@ -60,9 +60,13 @@ maq_predictor_config default_predictor_config() {
   return config;
 }
 
-// Opens the networks of a mode. Throws what opening them throws, and MAQ_ERROR_UNSUPPORTED where the bundle has none.
-std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const maq_predictor_config& config,
-                                                    int threads) {
+struct NetworksOfMode {
+  PredictionNetworks networks;
+  NetworkMode mode = NetworkMode::kMended;
+};
+
+// Throws what opening them throws, and MAQ_ERROR_UNSUPPORTED where the bundle has none of that mode.
+NetworksOfMode open_networks_of_mode(ContextState& state, const maq_predictor_config& config, int threads) {
   require_range("config.network_mode", number_in(config.network_mode), int32_t(MAQ_NETWORK_AUTO),
                 int32_t(MAQ_NETWORK_DRAWN));
   const CodeBundle bundle(read_bundle_argument(config, "config", kPredictorBundle));
@@ -81,29 +85,45 @@ std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const m
     throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name,
                 " has no networks that foresee pictures so; use another bundle, network_mode or method.");
   }
-  NetworkSettings settings;
-  settings.sampling = {config.temperature, config.top_k, config.seed};
-  PredictionNetworks networks;
-  networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
-  networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
+  NetworksOfMode opened;
+  opened.networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
+  opened.networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
   switch (mode) {
-    case MAQ_NETWORK_DRAWN: {
-      const CodeSampler checked(settings.sampling, bundle.codes->entries);
-      require_range("config.passes", config.passes, 0u, uint32_t(CodeTransformer::kMaxPasses));
-      settings.passes = config.passes;
-      settings.mode = NetworkMode::kDrawn;
-      networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
+    case MAQ_NETWORK_DRAWN:
+      opened.mode = NetworkMode::kDrawn;
+      opened.networks.transformer = std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, session);
       break;
-    }
     case MAQ_NETWORK_EXPECTED:
-      settings.mode = NetworkMode::kExpected;
-      networks.expected = std::make_shared<ExpectedFrame>(state.onnxruntime(), bundle, session);
+      opened.mode = NetworkMode::kExpected;
+      opened.networks.expected = std::make_shared<ExpectedFrame>(state.onnxruntime(), bundle, session);
       break;
     default:
-      settings.mode = NetworkMode::kMended;
-      networks.mended = std::make_shared<MendedPicture>(state.onnxruntime(), bundle, session);
+      opened.mode = NetworkMode::kMended;
+      opened.networks.mended = std::make_shared<MendedPicture>(state.onnxruntime(), bundle, session);
   }
-  return std::make_unique<NetworkPredictor>(std::move(networks), settings, threads);
+  return opened;
+}
+
+std::unique_ptr<NetworkPredictor> network_predictor(ContextState& state, const maq_predictor_config& config,
+                                                    int threads) {
+  NetworksOfMode own;
+  if (config.networks_of != nullptr) {
+    require_argument(config.networks_of, "config.networks_of");
+    const NetworkPredictor* const other = config.networks_of->by_network.get();
+    if (other == nullptr) throw ArgumentError("config.networks_of has no networks; its method is another.");
+    own = {other->networks(), other->settings().mode};
+  } else {
+    own = open_networks_of_mode(state, config, threads);
+  }
+  NetworkSettings settings;
+  settings.mode = own.mode;
+  if (own.mode == NetworkMode::kDrawn) {
+    settings.sampling = {config.temperature, config.top_k, config.seed};
+    const CodeSampler checked(settings.sampling, own.networks.encoder->codes().entries);
+    require_range("config.passes", config.passes, 0u, uint32_t(CodeTransformer::kMaxPasses));
+    settings.passes = config.passes;
+  }
+  return std::make_unique<NetworkPredictor>(std::move(own.networks), settings, threads);
 }
 
 NetworkPredictor& drawing(const maq_predictor* predictor) {
@@ -166,7 +186,7 @@ maq_status maq_predictor_draw(maq_predictor* predictor, uint32_t sample_count, u
   return guarded_alone(predictor, "predictor", __func__, [&] {
     require_range("sample_count", sample_count, 1u, uint32_t(CodeTransformer::kMaxSamples));
     require_range("frame_count", frame_count, 1u, uint32_t(NetworkPredictor::kMaxDrawn));
-    require_range("step_s", step_s, 1e-6, double(NetworkPredictor::kLongestStep_ns) / 1e9);
+    require_range("step_s", step_s, 1e-6, double(NetworkPredictor::kMaxStep_ns) / 1e9);
     drawing(predictor).draw(sample_count, frame_count, std::llround(step_s * 1e9));
     return MAQ_OK;
   });

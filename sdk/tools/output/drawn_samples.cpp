@@ -7,7 +7,7 @@
 
 namespace {
 
-constexpr double kLongestStep_s = 0.1;
+constexpr double kMaxStep_s = 0.125;
 constexpr int64_t kMaxSteps = 64;   // of maq_predictor_draw
 constexpr float kFullRed_bits = 5;  // of a cell: most are below that
 
@@ -30,9 +30,9 @@ DrawnSamples::DrawnSamples(const maquette::Context& context, const SampleOptions
     : options_(options), predictor_(make_drawing(context, options, threads)) {}
 
 void DrawnSamples::draw(int64_t frames, double step_s) {
-  steps_a_frame_ = std::max(int64_t(1), int64_t(std::ceil(step_s / kLongestStep_s - 1e-6)));
+  steps_a_frame_ = std::max(int64_t(1), int64_t(std::ceil(step_s / kMaxStep_s - 1e-6)));
   if (frames * steps_a_frame_ > kMaxSteps) {
-    throw std::runtime_error("Samples have at most " + std::to_string(kMaxSteps) + " steps of 0.1 s; give --frames " +
+    throw std::runtime_error("Samples have at most " + std::to_string(kMaxSteps) + " steps of 0.125 s; give --frames " +
                              std::to_string(kMaxSteps / steps_a_frame_) + " or less.");
   }
   predictor_.draw(uint32_t(options_.samples), steps(frames), step_s / double(steps_a_frame_));

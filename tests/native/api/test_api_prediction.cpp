@@ -165,6 +165,39 @@ TEST_F(ApiPrediction, SamplesAreMarkedFramesThatDependOnNoOther) {
   EXPECT_NE(another.uncertainty(1, 2), bits);
 }
 
+TEST_F(ApiPrediction, PredictorsThatShareNetworksDrawAsAloneAndOutliveOneAnother) {
+  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+  config.temperature = 1;
+  maquette::Predictor alone(context_, config);
+  auto first = std::make_unique<maquette::Predictor>(context_, config);
+  config.networks_of = first->get();
+  config.bundle_path = "/nowhere";  // not read
+  maquette::Predictor second(context_, config);
+  config.seed = 8;
+  maquette::Predictor other_seed(context_, config);
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=4");
+  while (const auto frame = source.next()) {
+    for (maquette::Predictor* const each : {&alone, first.get(), &second, &other_seed}) each->push(*frame);
+    if (frame->desc().sequence == 1) first->draw(2, 1, 0.1);  // of another stream
+  }
+  for (maquette::Predictor* const each : {&alone, first.get(), &second, &other_seed}) each->draw(1, 2, 0.1);
+  const std::vector<float> bits = alone.uncertainty(0, 2);
+  EXPECT_EQ(second.uncertainty(0, 2), bits);
+  EXPECT_EQ(first->uncertainty(0, 2), bits);
+  EXPECT_NE(other_seed.uncertainty(0, 2), bits);
+  first.reset();
+  second.draw(1, 2, 0.1);
+  EXPECT_EQ(second.uncertainty(0, 2), bits);
+  const maquette::Predictor without(context_);
+  maq_predictor* made = nullptr;
+  config.networks_of = without.get();
+  EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(text().find("config.networks_of has no networks"), std::string::npos) << text();
+  config.networks_of = reinterpret_cast<const maq_predictor*>(context_.get());
+  EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(text().find("config.networks_of is a maq_context"), std::string::npos) << text();
+}
+
 TEST_F(ApiPrediction, WhatWasNotDrawnIsToldAndForgottenWithTheFrames) {
   maquette::Predictor predictor(context_, network_config(MAQ_NETWORK_DRAWN)), automatic(context_),
       expected(context_, network_config(MAQ_NETWORK_EXPECTED));
@@ -184,7 +217,7 @@ TEST_F(ApiPrediction, WhatWasNotDrawnIsToldAndForgottenWithTheFrames) {
   refused(maq_predictor_draw(predictor.get(), 0, 1, 0.1), kWrong, "sample_count is 0");
   refused(maq_predictor_draw(predictor.get(), 17, 1, 0.1), kWrong, "sample_count is 17");
   refused(maq_predictor_draw(predictor.get(), 1, 65, 0.1), kWrong, "frame_count is 65");
-  for (const double step_s : {0.0, -0.1, 0.1001, std::nan(""), double(std::numeric_limits<float>::infinity())}) {
+  for (const double step_s : {0.0, -0.1, 0.1251, std::nan(""), double(std::numeric_limits<float>::infinity())}) {
     refused(maq_predictor_draw(predictor.get(), 1, 1, step_s), kWrong, "step_s is");
   }
   refused(maq_predictor_acquire_drawn(predictor.get(), 0, 1, &made), kWrong, "Frame 1 of sample 0 was asked for");

@@ -120,7 +120,7 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
         return go_on
 
     known |= {"likeliest": drawn_by(1), "temperature 0.5": drawn_by(4), "temperature 1": drawn_by(16)}
-    monkeypatch.setattr(continuations, "methods", lambda bundle: known)
+    monkeypatch.setattr(continuations, "methods", lambda bundle, samples: known)
     document, figures = measure.measure_pictures(
         Clips(frames, torch.tensor([10.0, 30]), ["a", "b"]), np.empty(0), BUNDLE
     )

@@ -15,9 +15,13 @@ import torch
 
 from export.bundle import BundleInfo
 from export.clips.shapes import shapes_clip
+from export.prediction.bundle import TRANSFORMER
 from export.prediction.code_file import FrameCodes, prior_of, read_code_file
 from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
+from export.prediction.graphs.code_sampler import drawn_code
+from export.prediction.graphs.graph_runtime import GraphRuntime
+from export.prediction.graphs.transformer_file import read_transformer_file
 from export.prediction.motion_pictures import MotionJob, motion_pictures
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.train_autoencoder import load_autoencoder
@@ -95,3 +99,34 @@ def test_the_table_alone_can_be_asked_for(made):
     assert surprise.stats["transformer_ms"] == 0
     sharing = maquette.Surprise(networks_of=surprise)
     assert np.mean(np.abs(bits_of(sharing, frames) - expected) < 1e-3) >= 0.99
+
+
+def test_samples_of_a_seed_are_those_of_the_reference(made):
+    folder, autoencoder, _, stored, frames, codes = made
+    seen, made_frames, seed = 5, 2, 11
+    predictor = maquette.Predictor(
+        "network", network_mode=3, bundle_path=folder, temperature=1, seed=seed, threads=1
+    )  # fmt: skip
+    base = maquette.Predictor("motion", threads=1)
+    for t in range(seen):
+        predictor.push(np.ascontiguousarray(frames[t]), time_s=t / FPS)
+        base.push(np.ascontiguousarray(frames[t]), time_s=t / FPS)
+    predictor.draw(2, made_frames, 1 / FPS)
+    tables = read_transformer_file(folder / TRANSFORMER)
+    runtime = GraphRuntime(folder, tables, prior_of(stored))
+    for sample in range(2):
+        before = list(codes[seen - 3 : seen].numpy())
+        for number in range(1, made_frames + 1):
+            moved = autoencoder.encode(torch.from_numpy(base.predict(number / FPS).pixels()[None]))[0].numpy()
+            runtime.begin(np.stack([*before, moved]), FPS)
+            entropy = np.zeros((SHAPE.slices, 256))
+
+            def chosen(k, place, logits, number=number, sample=sample, entropy=entropy):
+                likely = logits.astype(np.float64) - np.logaddexp.reduce(logits.astype(np.float64))
+                entropy[k, place] = -(np.exp(likely) * likely).sum() / math.log(2)
+                return drawn_code(logits.astype(np.float32), 1, seed, seen, number, sample, place, k)
+
+            before = [*before[1:], runtime.chosen(chosen)]
+            found = predictor.uncertainty(sample, number)
+            # A place depends on all codes before it: one that differed would change most of those after it.
+            assert np.mean(np.abs(found - entropy.mean(0).reshape(16, 16)) < 2e-3) >= 0.99, (sample, number)

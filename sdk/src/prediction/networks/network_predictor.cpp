@@ -188,7 +188,7 @@ void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
       add_made(frame);
       break;
     case NetworkMode::kDrawn: {
-      const int64_t count = (ahead_ns + kLongestStep_ns - 1) / kLongestStep_ns;
+      const int64_t count = (ahead_ns + kTrainedStep_ns - 1) / kTrainedStep_ns;
       draw(1, size_t(count), ahead_ns / count);
       networks_.decoder->picture(drawn_.data() + (size_t(count) - 1) * codes_.size(), made_.data());
       add_made(frame);

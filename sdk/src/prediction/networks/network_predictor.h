@@ -57,10 +57,11 @@ class NetworkPredictor {
 
   // Draws `samples` streams of `count` frames that may come, `step_ns` apart, each seen as true when the next one of
   // its stream is drawn, beside what motion foresees from the true ones; all are the last frame while nothing moves,
-  // and before the second frame. `step_ns` is at most kLongestStep_ns, and all of them at most Predictor::kMaxAhead_ns.
-  // They are known until another frame is pushed, predict() or reset(). Throws MAQ_ERROR_UNSUPPORTED in another mode
-  // than kDrawn, MAQ_ERROR_INVALID_ARGUMENT before the first frame; what the networks throw.
-  static constexpr int64_t kLongestStep_ns = 100000000;  // the transformer was trained up to that
+  // and before the second frame. `step_ns` is at most kMaxStep_ns. They are known until another frame is pushed,
+  // predict() or reset(). Throws MAQ_ERROR_UNSUPPORTED in another mode than kDrawn, MAQ_ERROR_INVALID_ARGUMENT before
+  // the first frame; what the networks throw.
+  static constexpr int64_t kTrainedStep_ns = 100000000;  // the longest that the transformer knows
+  static constexpr int64_t kMaxStep_ns = 125000000;      // taken as that: cameras keep no exact time
   static constexpr size_t kMaxDrawn = 64;                // frames of a stream
   void draw(size_t samples, size_t count, int64_t step_ns);
   // The picture of frame `number`, from 1, of a sample, from 0, as predict() makes it. Throws
@@ -72,6 +73,8 @@ class NetworkPredictor {
   int64_t step_ns() const { return step_ns_; }
   size_t places() const { return networks_.encoder->codes().places(); }
 
+  const PredictionNetworks& networks() const { return networks_; }
+  const NetworkSettings& settings() const { return settings_; }
   const PredictorStats& stats() const { return base_.stats(); }
   float networks_ms() const { return networks_ms_; }  // of the latest push, prediction or draw
   size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction or draw

@@ -24,6 +24,14 @@ struct StoppableConcealer {
   std::atomic<bool> is_stopped{false};
 };
 
+maq_predictor_config predictor_config(const std::vector<jdouble>& from) {
+  maq_predictor_config config;
+  check(maq_predictor_config_init(&config, sizeof config));
+  config.threads = int32_t(from[0]);
+  config.frame_pool_size = maq_jni::count_of(from[2]);
+  return config;
+}
+
 }  // namespace
 
 // `values` as in Predictor.Config.
@@ -31,11 +39,29 @@ MAQ_NATIVE_OF(NativePrediction, jlong, createPredictor)
 (JNIEnv* env, jclass, jlong context, jdoubleArray values) {
   return call(env, [&] {
     const std::vector<jdouble> from = maq_jni::numbers(env, values, 3);
-    maq_predictor_config config;
-    check(maq_predictor_config_init(&config, sizeof config));
-    config.threads = int32_t(from[0]);
+    maq_predictor_config config = predictor_config(from);
     config.method = maq_prediction_method(int32_t(from[1]));
-    config.frame_pool_size = maq_jni::count_of(from[2]);
+    maq_predictor* predictor = nullptr;
+    check(maq_predictor_create(object<maq_context>(context), &config, &predictor));
+    return handle(predictor);
+  });
+}
+
+// `values` as in Predictor.Config, then in Predictor.Sampling without its seed.
+MAQ_NATIVE_OF(NativePrediction, jlong, createDrawingPredictor)
+(JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values,
+ jlong seed) {
+  return call(env, [&] {
+    const maq_jni::Bundle bundle(env, folder, names, buffers);
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 6);
+    maq_predictor_config config = predictor_config(from);
+    bundle.put_into(config);
+    config.method = MAQ_PREDICTION_NETWORK;
+    config.network_mode = MAQ_NETWORK_DRAWN;
+    config.temperature = float(from[3]);
+    config.top_k = maq_jni::count_of(from[4]);
+    config.passes = maq_jni::count_of(from[5]);
+    config.seed = uint64_t(seed);
     maq_predictor* predictor = nullptr;
     check(maq_predictor_create(object<maq_context>(context), &config, &predictor));
     return handle(predictor);
@@ -55,6 +81,33 @@ MAQ_NATIVE_OF(NativePrediction, jlong, predict)(JNIEnv* env, jclass, jlong predi
     maq_frame* frame = nullptr;
     check(maq_predictor_predict(object<maq_predictor>(predictor), ahead_s, &frame));
     return handle(frame);
+  });
+}
+
+MAQ_NATIVE_OF(NativePrediction, void, draw)
+(JNIEnv* env, jclass, jlong predictor, jint samples, jint frames, jdouble step_s) {
+  call(env, [&] {
+    check(maq_predictor_draw(object<maq_predictor>(predictor), uint32_t(samples), uint32_t(frames), step_s));
+  });
+}
+
+MAQ_NATIVE_OF(NativePrediction, jlong, drawn)(JNIEnv* env, jclass, jlong predictor, jint sample, jint number) {
+  return call(env, [&] {
+    maq_frame* frame = nullptr;
+    check(maq_predictor_acquire_drawn(object<maq_predictor>(predictor), uint32_t(sample), uint32_t(number), &frame));
+    return handle(frame);
+  });
+}
+
+MAQ_NATIVE_OF(NativePrediction, jfloatArray, uncertainty)
+(JNIEnv* env, jclass, jlong predictor, jint sample, jint number) {
+  return call(env, [&] {
+    const auto* const drawing = object<maq_predictor>(predictor);
+    auto stats = sized<maq_predictor_stats>();
+    check(maq_predictor_get_stats(drawing, &stats));
+    std::vector<jfloat> bits(stats.cell_count > 0 ? stats.cell_count : 1);
+    check(maq_predictor_copy_uncertainty(drawing, uint32_t(sample), uint32_t(number), bits.data(), bits.size()));
+    return maq_jni::floats_of(env, bits.data(), bits.size());
   });
 }
 

@@ -225,6 +225,27 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         handle.use { context -> Predictor(NativePrediction.createPredictor(context, config.values())) }
 
     /**
+     * A predictor that draws samples of what may come, as well: [Predictor.draw]. Loads the networks of prediction;
+     * takes some 10 ms, so not on the main thread.
+     *
+     * @param config its method is not read: what it predicts is drawn.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
+     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task, or without a transformer).
+     */
+    fun predictor(
+        bundle: ModelBundle,
+        sampling: Predictor.Sampling = Predictor.Sampling(),
+        config: Predictor.Config = Predictor.Config(),
+    ): Predictor =
+        handle.use { context ->
+            val values = config.values() + sampling.values()
+            val (folder, names, buffers) = Triple(bundle.folder, bundle.names, bundle.buffers)
+            Predictor(
+                NativePrediction.createDrawingPredictor(context, folder, names, buffers, values, sampling.seed),
+            )
+        }
+
+    /**
      * How surprising the frames of one stream are. Loads the networks of prediction; takes some 10 ms, so not on the
      * main thread.
      *

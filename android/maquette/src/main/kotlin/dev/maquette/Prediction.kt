@@ -47,6 +47,23 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
+     * How samples of coming frames are drawn, by a predictor that was made with networks.
+     *
+     * @property temperature 1 draws by the probabilities, 0 takes the likeliest.
+     * @property topK only so many of the likeliest of each code; 0: all.
+     * @property seed equal seeds draw the same.
+     * @property passes 0: exactly by the probabilities; 1 to 16: all places of a frame at once, at most so many times.
+     */
+    data class Sampling(
+        val temperature: Float = 1f,
+        val topK: Int = 0,
+        val seed: Long = 0,
+        val passes: Int = 0,
+    ) {
+        internal fun values() = doubleArrayOf(temperature.toDouble(), topK.toDouble(), passes.toDouble())
+    }
+
+    /**
      * Wall-clock milliseconds of the latest push and prediction, and counts since the predictor was made.
      *
      * @property greyMs of the push: the frame copied, and its brightness at several sizes.
@@ -95,6 +112,32 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      *   while [Config.framePoolSize] frames are open.
      */
     fun predict(aheadS: Double): Frame = Frame(handle.use { NativePrediction.predict(it, aheadS) })
+
+    /**
+     * Draws [samples], 1 to 16, of what the stream may show, each [frames], 1 to 64, that are [stepS], to 0.125, apart.
+     * A sample is the same however many others are drawn. While nothing moves all are the last frame. [drawn] and
+     * [uncertainty] give them until the next push, prediction or draw. Takes long, so not on the main thread.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame) and [Status.UNSUPPORTED]
+     *   (a predictor without networks).
+     */
+    fun draw(samples: Int, frames: Int, stepS: Double) =
+        handle.use { NativePrediction.draw(it, samples, frames, stepS) }
+
+    /**
+     * The picture of frame [number], from 1, of a sample, from 0; all else as of [predict].
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for one that was not drawn, and [Status.POOL_EMPTY].
+     */
+    fun drawn(sample: Int, number: Int): Frame = Frame(handle.use { NativePrediction.drawn(it, sample, number) })
+
+    /**
+     * How uncertain that frame was when it was drawn: the entropy of a code in bits, of 16 x 16 cells row by row.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for one that was not drawn.
+     */
+    fun uncertainty(sample: Int, number: Int): FloatArray =
+        handle.use { NativePrediction.uncertainty(it, sample, number) }
 
     /** Forgets the frames so far, as before another stream. */
     fun reset() = handle.use(NativePrediction::resetPredictor)

@@ -102,6 +102,29 @@ class PredictorTest : AndroidTest() {
         }
 
     @Test
+    fun samplesAreDrawnEachByItselfAndSayWhereTheyAreUncertain() {
+        val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
+        val sampling = Predictor.Sampling(seed = -2)
+        maquette.predictor(networks, sampling, Predictor.Config(threads = 1)).use { predictor ->
+            predictor.pushTexture(0..2)
+            predictor.draw(3, 2, stepS = 0.1)
+            val bits = predictor.uncertainty(1, 2)
+            assertEquals(256, bits.size)
+            assertTrue("${bits.average()}", bits.average() in 0.3..9.0)
+            predictor.drawn(1, 2).use { assertEquals(200_000_000L, it.origin!!.horizonNs) }
+            predictor.draw(2, 2, stepS = 0.1)
+            assertArrayEquals(bits, predictor.uncertainty(1, 2), 0f)
+            assertTrue("of 2 samples" in failure(Status.INVALID_ARGUMENT) { predictor.drawn(2, 1) })
+            failure(Status.INVALID_ARGUMENT) { predictor.draw(-1, 1, 0.1) }
+        }
+        for (wrong in listOf(sampling.copy(temperature = -1f), sampling.copy(topK = 513), sampling.copy(passes = 17))) {
+            failure(Status.INVALID_ARGUMENT) { maquette.predictor(networks, wrong) }
+        }
+        withMoving { failure(Status.UNSUPPORTED) { it.draw(1, 1, 0.1) } }
+        withMoving { failure(Status.UNSUPPORTED) { it.uncertainty(0, 1) } }
+    }
+
+    @Test
     fun framesThatAreHeldAreAsManyAsThePoolHasAndOutliveThePredictor() {
         val predictor = maquette.predictor(byMotion.copy(framePoolSize = 2))
         predictor.pushTexture(0..1)

@@ -10,9 +10,23 @@ internal object NativePrediction {
     }
 
     @JvmStatic external fun createPredictor(context: Long, values: DoubleArray): Long
+
+    @JvmStatic
+    external fun createDrawingPredictor(
+        context: Long,
+        folder: ByteArray?,
+        names: Array<ByteArray>?,
+        buffers: Array<ByteBuffer>?,
+        values: DoubleArray,
+        seed: Long,
+    ): Long
+
     @JvmStatic external fun destroyPredictor(predictor: Long)
     @JvmStatic external fun pushToPredictor(predictor: Long, frame: Long)
     @JvmStatic external fun predict(predictor: Long, aheadS: Double): Long
+    @JvmStatic external fun draw(predictor: Long, samples: Int, frames: Int, stepS: Double)
+    @JvmStatic external fun drawn(predictor: Long, sample: Int, number: Int): Long
+    @JvmStatic external fun uncertainty(predictor: Long, sample: Int, number: Int): FloatArray
     @JvmStatic external fun resetPredictor(predictor: Long)
     @JvmStatic external fun statsOfPredictor(predictor: Long): DoubleArray
 

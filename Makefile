@@ -64,6 +64,10 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 	@scripts/make-venv.sh
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
+.PHONY: test-glb
+test-glb: build  ## heads as .glb by the Khronos validator; needs node and npm; not part of `test`
+	@scripts/test-glb.sh
+
 FUZZ_SECONDS ?= 60
 .PHONY: fuzz
 fuzz: packages-test  ## files of heads that nobody would write, FUZZ_SECONDS of each kind, with AddressSanitizer; not part of `test`

@@ -32,16 +32,16 @@ _TIME = """A fit ends by its time, by 300 steps, or when the pixels held out gai
 figures depend on the machine and on what else it does: the column of steps says how far it came."""
 
 _BASELINES = """*Linear head*: the 64 principal components of the vertices of the training heads, fitted to what the
-same encoder sees (template points, and its estimate of the codes carried over to the components) with the same camera
-model and prior. *MediaPipe's 468 points*: its face network's points with their depth, as a mesh; it covers the inner
-face alone, and is aligned by it, as all others are for that column. *Seen side*: true points that the photos show,
-after the alignment of the whole head; *unseen side*: the others. *Result to truth*: from points of the mesh to the true
-surface. *New views*: PSNR inside of both silhouettes of six views 30° to 60° around from the photo, in its light,
-before grey; of the fitted head with a texture of 512 x 512, and *without texture* with the network's colours. The mean
-head has the photo projected onto it by the true camera, and where the photo does not see it the colour of the nearest
-place that it does. *By features*: how far features of the person detector's trunk differ, relative to their size,
-averaged over four layers (lower is better); in the manner of LPIPS, without anybody's judgement in it. NeuS from a
-sphere is not among them: it takes minutes, and is a command of its own (`python -m benchmarks.heads.alone.neus`)."""
+same encoder sees (template points) with the same camera model and prior. *MediaPipe's 468 points*: its face network's
+points with their depth, as a mesh; it covers the inner face alone, and is aligned by it, as all others are for that
+column. *Seen side*: true points that the photos show, after the alignment of the whole head; *unseen side*: the
+others. *Result to truth*: from points of the mesh to the true surface. *New views*: PSNR inside of both silhouettes
+of six views 30° to 60° around from the photo, in its light, before grey; of the fitted head with a texture of 512 x
+512, and *without texture* with the network's colours. The mean head has the photo projected onto it by the true
+camera, and where the photo does not see it the colour of the nearest place that it does. *By features*: how far
+features of the person detector's trunk differ, relative to their size, averaged over four layers (lower is better);
+in the manner of LPIPS, without anybody's judgement in it. NeuS from a sphere is not among them: it takes minutes, and
+is a command of its own (`python -m benchmarks.heads.alone.neus`, figures in docs/heads.md)."""
 
 _REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
 mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted

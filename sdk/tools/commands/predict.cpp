@@ -20,6 +20,7 @@
 #include "interrupt.h"
 #include "output/drawn_samples.h"
 #include "output/frame_image.h"
+#include "output/output_file.h"
 #include "output/predicted_pictures.h"
 #include "output/prediction_mark.h"
 #include "output/progress_bar.h"

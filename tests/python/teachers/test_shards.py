@@ -145,6 +145,17 @@ def test_shards_are_read_by_the_training(folders, capsys):
     assert len(truths) == 8
 
 
+def test_hands_can_be_left_to_wrists_and_knuckles(folders, monkeypatch):
+    photo_labels().save(folders / "labels" / "a.npz")
+    asked = []
+    monkeypatch.setattr(shards, "HandNetwork", lambda: asked.append("opened") or "network")
+    monkeypatch.setattr(shards, "hands_of", lambda network, image, labels: asked.append(network) or {})
+    assert main([*arguments(folders), "--composed", "1", "--no-hands"]) == 0
+    assert asked == []
+    assert main([*arguments(folders), "--composed", "1"]) == 0
+    assert asked == ["opened", "network"]
+
+
 def test_photos_without_labels_are_named_before_anything_is_written(folders, capsys):
     assert main(arguments(folders)) == 1
     assert "export.teachers" in capsys.readouterr().err

@@ -121,8 +121,8 @@ def distill(options: argparse.Namespace) -> None:
     photos = load_records(options.photos) if options.photos else []
     drawn = {"photos": photos, "photo_fraction": options.photo_fraction, "ahead": 0}
     batches = data.Batches(records, options.batch, options.seed, run.step, **drawn)
-    kept_out = data.Batches(load_records(options.data[0] / "val"), options.batch, 1, ahead=0)
-    held_out = [kept_out.next(SIZES[-1:], data.USUAL_CROPPING)[0] for _ in range(HELD_OUT_BATCHES)]
+    validation = data.Batches(load_records(options.data[0] / "val"), options.batch, 1, ahead=0)
+    held_out = [validation.next(SIZES[-1:], data.USUAL_CROPPING)[0] for _ in range(HELD_OUT_BATCHES)]
     autocast = torch.autocast("cpu", torch.bfloat16, enabled=options.bf16)
     watch, smoothed, save_due = Stopwatch(run.spent_s), SmoothedTerms(), Interval(options.save_minutes * 60)
     bar = schedule.bar(run.step, run.spent_s)

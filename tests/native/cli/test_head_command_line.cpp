@@ -65,6 +65,28 @@ TEST_F(HeadCommandLine, PhotosAreAddedToASavedHead) {
   EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2) << "what was there stays";
 }
 
+TEST_F(HeadCommandLine, FramesOfAClipArePhotosOfOneHead) {
+  {
+    cv::VideoWriter clip(folder_.file("turn.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10, cv::Size(320, 240));
+    ASSERT_TRUE(clip.isOpened());
+    for (int i = 0; i < 12; ++i) clip.write(cv::Mat(240, 320, CV_8UC3, cv::Scalar(120, 130, 140)));
+  }
+  const Outcome made = run("turn.avi --frames 3 --seconds 0 --json --save a.maqh");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto photos = nlohmann::json::parse(made.out)["photos"];
+  ASSERT_EQ(photos.size(), 3u) << made.out;
+  for (const size_t i : {0, 1, 2}) {
+    EXPECT_EQ(photos[i]["photo"], "file:turn.avi, frame " + std::to_string(2 + 4 * i));
+  }
+  EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 3);
+  EXPECT_EQ(
+      nlohmann::json::parse(run("turn.avi grey.png --frames 1 --seconds 0 --json --save b.maqh").out)["photos"].size(),
+      2u);
+  expect_error("turn.avi --person 2 --save c.maqh", 1, "not for a clip; see --frames");
+  expect_error("turn.avi --frames 65 --save c.maqh", 2, "--frames");
+  EXPECT_FALSE(exists("c.maqh"));
+}
+
 TEST_F(HeadCommandLine, ADistanceOrADepthImageGivesTheSize) {
   const std::string photo = "grey.png --box 110,60,200,180 --seconds 0 --json --save a.maqh ";
   const auto given = nlohmann::json::parse(run(photo + "--pupils 70").out);

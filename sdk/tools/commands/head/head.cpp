@@ -30,6 +30,7 @@ using BoxPx = std::array<float, 4>;
 
 struct HeadOptions {
   std::vector<std::string> photos;
+  int64_t clip_frames = 8;
   std::string add;  // a head that the photos are added to; empty: a new one
   std::string out, save, preview;
   double seconds = 3;
@@ -67,7 +68,9 @@ class LapTimer {
 };
 
 struct Photo {
-  SourceArgument argument;
+  std::string name;  // its URI, and of clips the frame's number
+  bool is_of_clip;
+  std::vector<uint8_t> pixels;  // of a clip's frame
   maquette::Frame frame;
   float focal_px;            // 0: not known
   std::vector<BoxPx> heads;  // the largest first; empty: none was found
@@ -83,17 +86,46 @@ struct Stages {
   double find_ms = 0, look_ms = 0, pose_ms = 0, fit_ms = 0, mesh_ms = 0;
 };
 
-Photo read_photo(const HeadOptions& options, const maquette::Context& context, const std::string& text) {
-  SourceArgument argument = parse_source_argument(text);
+// A frame of a clip, copied: the source needs its own frames to go on.
+Photo copied(const maquette::Context& context, const maquette::Frame& frame, std::string name, float focal_px) {
+  const maq_frame_desc from = frame.desc();
+  std::vector<uint8_t> pixels(size_t(from.width_px) * size_t(from.height_px) * 3);
+  frame.copy_pixels(MAQ_PIXEL_BGR8, pixels.data(), 0, pixels.size());
+  maq_frame_desc desc;
+  maquette::check(maq_frame_desc_init(&desc, sizeof desc));
+  desc.format = MAQ_PIXEL_BGR8;
+  desc.width_px = from.width_px;
+  desc.height_px = from.height_px;
+  desc.planes[0] = pixels.data();
+  maquette::Frame copy(context, desc);
+  return {std::move(name), true, std::move(pixels), std::move(copy), focal_px, {}};
+}
+
+// One photo, or frames of a clip, evenly over its length.
+std::vector<Photo> read_photos(const HeadOptions& options, const maquette::Context& context, const std::string& text) {
+  const SourceArgument argument = parse_source_argument(text);
   maquette::Source source(context, argument.uri);
   const StoppedByInterrupt stopped(source);
-  std::optional<maquette::Frame> frame = source.next();
-  if (!frame) throw std::runtime_error(argument.uri + " has no picture.");
-  float focal_px = options.focal_px;
-  if (focal_px == 0) {
-    if (const auto intrinsics = source.intrinsics()) focal_px = float(intrinsics->fx_px);
+  const int64_t count = source.info().frame_count;  // negative: not known
+  const int64_t wanted = std::clamp(count, int64_t(1), options.clip_frames);
+  std::vector<Photo> photos;
+  for (int64_t index = 0; int64_t(photos.size()) < wanted && !interrupted(); ++index) {
+    std::optional<maquette::Frame> frame = source.next();
+    if (!frame) break;
+    const int64_t number = int64_t(photos.size());
+    if (index < (2 * number + 1) * count / (2 * wanted)) continue;
+    float focal_px = options.focal_px;
+    if (focal_px == 0) {
+      if (const auto intrinsics = source.intrinsics()) focal_px = float(intrinsics->fx_px);
+    }
+    if (count <= 1) {
+      photos.push_back({argument.uri, false, {}, std::move(*frame), focal_px, {}});
+    } else {
+      photos.push_back(copied(context, *frame, argument.uri + ", frame " + std::to_string(index), focal_px));
+    }
   }
-  return {std::move(argument), std::move(*frame), focal_px, {}};
+  if (photos.empty()) throw std::runtime_error(argument.uri + " has no picture.");
+  return photos;
 }
 
 // Heads of the people in the photos.
@@ -122,6 +154,12 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     std::stable_sort(photo.heads.begin(), photo.heads.end(),
                      [&](const BoxPx& a, const BoxPx& b) { return area(a) > area(b); });
   }
+  // Frames of a clip where nobody was found tell nothing, where somebody was found elsewhere.
+  const auto shows_somebody = [](const Photo& photo) { return !photo.heads.empty(); };
+  if (std::any_of(photos.begin(), photos.end(), shows_somebody)) {
+    const auto is_empty = [&](const Photo& photo) { return photo.is_of_clip && !shows_somebody(photo); };
+    photos.erase(std::remove_if(photos.begin(), photos.end(), is_empty), photos.end());
+  }
 }
 
 // head.glb -> head_2.glb.
@@ -137,12 +175,12 @@ std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>&
   if (options.person != "all") {
     const size_t person = size_t(std::stoul(options.person)) - 1;
     if (person > 0 && person >= first.heads.size()) {
-      throw std::runtime_error(first.argument.uri + " shows " + std::to_string(first.heads.size()) +
+      throw std::runtime_error(first.name + " shows " + std::to_string(first.heads.size()) +
                                " heads, so there is no person " + options.person + "; name another, or --box.");
     }
     return {{person, options.out, options.save, options.preview}};
   }
-  if (first.heads.empty()) throw std::runtime_error(first.argument.uri + " shows no heads of people.");
+  if (first.heads.empty()) throw std::runtime_error(first.name + " shows no heads of people.");
   std::vector<Task> tasks;
   for (size_t i = 0; i < first.heads.size(); ++i) {
     tasks.push_back(
@@ -151,8 +189,12 @@ std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>&
   return tasks;
 }
 
-void add_photos(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+using Seen = std::vector<const Photo*>;  // as the builder counts them
+
+// All photos; of a clip, those frames where the network sees a head, if it does in any.
+Seen add_photos(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
                 maquette::HeadBuilder& builder) {
+  Seen seen;
   for (const Photo& photo : photos) {
     maq_head_photo known = maquette::default_head_photo();
     if (!photo.heads.empty()) {
@@ -163,22 +205,28 @@ void add_photos(const HeadOptions& options, const std::vector<Photo>& photos, co
     known.focal_px = photo.focal_px;
     try {
       builder.add_photo(photo.frame, known);
+      seen.push_back(&photo);
     } catch (const maquette::Error& error) {
-      throw std::runtime_error(photo.argument.uri + ": " + error.what());
+      const bool is_last = &photo == &photos.back() && seen.empty();
+      if (photo.is_of_clip && error.status() == MAQ_ERROR_NOT_FOUND && !is_last) continue;
+      throw std::runtime_error(photo.name + ": " + error.what());
     }
   }
+  return seen;
 }
 
 nlohmann::ordered_json describe_photo(const Photo& photo, const maq_head_photo_info& found) {
-  return {{"photo", photo.argument.uri},       {"box_px", found.box_px},
-          {"used", found.is_used != 0},        {"focal_px", found.focal_px},
-          {"focal_known", photo.focal_px > 0}, {"rms_px", found.rms_px}};
+  return {{"photo", photo.name},
+          {"box_px", found.box_px},
+          {"used", found.is_used != 0},
+          {"focal_px", found.focal_px},
+          {"focal_known", photo.focal_px > 0},
+          {"rms_px", found.rms_px}};
 }
 
 void print_photo(const Photo& photo, const maq_head_photo_info& found) {
   const float* const box = found.box_px;
-  print_output("%s  head of %.0f x %.0f px", photo.argument.uri.c_str(), double(box[2] - box[0]),
-               double(box[3] - box[1]));
+  print_output("%s  head of %.0f x %.0f px", photo.name.c_str(), double(box[2] - box[0]), double(box[3] - box[1]));
   if (found.is_used == 0) {
     print_output("  left out: it shows no head, or another than the other photos\n");
     return;
@@ -187,7 +235,7 @@ void print_photo(const Photo& photo, const maq_head_photo_info& found) {
                photo.focal_px > 0 ? "given" : "estimated", double(found.rms_px));
 }
 
-void print_result(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+void print_result(const HeadOptions& options, const Seen& photos, const Task& task,
                   const maquette::HeadBuilder& builder, maquette::Head& head, const maq_head_mesh* mesh,
                   const Stages& stages, const std::string& of_preview) {
   const maq_head_info info = head.info();
@@ -196,7 +244,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
   if (options.json) {
     nlohmann::ordered_json document = {{"person", task.person + 1}, {"photos", nlohmann::ordered_json::array()}};
     for (uint32_t i = 0; i < photos.size(); ++i)
-      document["photos"].push_back(describe_photo(photos[i], builder.photo(i)));
+      document["photos"].push_back(describe_photo(*photos[i], builder.photo(i)));
     if (!task.out.empty()) document["out"] = task.out;
     if (!task.save.empty()) document["save"] = task.save;
     if (!task.preview.empty()) document["preview"] = task.preview;
@@ -220,7 +268,7 @@ void print_result(const HeadOptions& options, const std::vector<Photo>& photos, 
     flush_output();
     return;
   }
-  for (uint32_t i = 0; i < photos.size(); ++i) print_photo(photos[i], builder.photo(i));
+  for (uint32_t i = 0; i < photos.size(); ++i) print_photo(*photos[i], builder.photo(i));
   print_output("  size %s", text_of_scale(info).c_str());
   if (pupils_m > 0) print_output("; pupils %.0f mm apart", 1e3 * pupils_m);
   print_output("\n  find people %.0f | look %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
@@ -249,17 +297,17 @@ maq_head_mesh_options mesh_options(const HeadOptions& options) {
 }
 
 // Of the size that the options tell.
-maquette::Head sized(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
+maquette::Head sized(const HeadOptions& options, const maquette::Context& context, const Photo& first,
                      const maquette::HeadBuilder& builder, maquette::Head head) {
   if (options.pupils_mm > 0) return head.scaled_by_distance("pupil_left", "pupil_right", 1e-3 * options.pupils_mm);
   if (options.depth.empty()) return head;
   if (builder.photo(0).is_used == 0) throw std::runtime_error("The first photo, whose depth is given, was left out.");
-  if (options.depth != "photo") return head.scaled_by_depth(read_photo(options, context, options.depth).frame);
-  if (!photos[0].frame.depth()) {
-    throw std::runtime_error(photos[0].argument.uri +
+  if (options.depth != "photo") return head.scaled_by_depth(read_photos(options, context, options.depth).front().frame);
+  if (!first.frame.depth()) {
+    throw std::runtime_error(first.name +
                              " came without depth; name its depth image: --depth 'image:depth.png?depth_unit=0.001'.");
   }
-  return head.scaled_by_depth(photos[0].frame);
+  return head.scaled_by_depth(first.frame);
 }
 
 void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
@@ -267,7 +315,7 @@ void fit_one(const HeadOptions& options, const maquette::Context& context, const
   builder.clear();
   if (!options.add.empty()) builder.add_head(maquette::Head::open(context, options.add));
   LapTimer timer;
-  add_photos(options, photos, task, builder);
+  const Seen seen = add_photos(options, photos, task, builder);
   stages.look_ms = timer.lap_ms();
   ProgressBar progress("fitting", kHeadPermille);
   const auto show = [&](double done) {
@@ -282,7 +330,7 @@ void fit_one(const HeadOptions& options, const maquette::Context& context, const
     throw std::runtime_error("Interrupted; no file was written.");
   }
   progress.finish();
-  head = sized(options, context, photos, builder, std::move(head));
+  head = sized(options, context, *seen.front(), builder, std::move(head));
   const maq_head_stats stats = builder.stats();
   stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
   timer.lap_ms();
@@ -300,7 +348,7 @@ void fit_one(const HeadOptions& options, const maquette::Context& context, const
     view.threads = options.network.threads;
     of_preview = write_head_view(context, head, task.preview, view);
   }
-  print_result(options, photos, task, builder, head, mesh ? &*mesh : nullptr, stages, of_preview);
+  print_result(options, seen, task, builder, head, mesh ? &*mesh : nullptr, stages, of_preview);
 }
 
 void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
@@ -327,7 +375,12 @@ int run_head(const HeadOptions& options) {
   }
   const maquette::Context context = open_context();
   std::vector<Photo> photos;
-  for (const std::string& text : options.photos) photos.push_back(read_photo(options, context, text));
+  for (const std::string& text : options.photos) {
+    for (Photo& photo : read_photos(options, context, text)) photos.push_back(std::move(photo));
+  }
+  if (photos.size() > 1 && (options.person != "1" || !options.box.empty())) {
+    throw std::runtime_error("--person and --box are for a single photo, not for a clip; see --frames.");
+  }
   maq_head_config config = maquette::default_head_config();
   config.bundle_path = bundle.c_str();
   config.threads = options.network.threads;
@@ -382,9 +435,14 @@ std::string check_triangles(const std::string& text) {
 
 void add_head_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<HeadOptions>();
-  CLI::App* command = app.add_subcommand("head", "Make a 3D head from one photo of a person, or from several");
+  CLI::App* command =
+      app.add_subcommand("head", "Make a 3D head from one photo of a person, from several, or from a clip");
   CLI::Option* const photos =
-      command->add_option("photo", options->photos, "Photos of one person: photo.jpg, 'image:photo.jpg?fov=60'");
+      command->add_option("photo", options->photos,
+                          "Photos of one person: photo.jpg, 'image:photo.jpg?fov=60'; or a clip in which the head "
+                          "turns: turn.mp4");
+  command->add_option("--frames", options->clip_frames, "Of a clip, so many frames, evenly over it (default 8)")
+      ->check(CLI::Range(int64_t(1), int64_t(64)));
   command->add_option("-o,--out", options->out, "Mesh to write: .glb (for most programs), .obj or .ply")
       ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
   command->add_option("--add", options->add,
@@ -465,6 +523,7 @@ void add_head_command(CLI::App& app, int* exit_code) {
       "Examples:\n"
       "  maquette head photo.jpg --out head.glb\n"
       "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
+      "  maquette head turn.mp4 --out head.glb --frames 8\n"
       "  maquette head right.jpg --add head.maqh --out head.glb --save head.maqh\n"
       "  maquette head group.jpg --out heads/head.ply --person all\n"
       "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"

@@ -43,6 +43,6 @@ def rolled(image: LabelledImage, degrees: float) -> LabelledImage:
 
 
 def _axes(image: LabelledImage, instance: np.ndarray) -> np.ndarray:
-    """Of these people in this order, [n, 2]; NaN where nobody knows."""
+    """Axes of these instance numbers [n] in their order, float32 [n, 2]; NaN where unknown."""
     known = dict(zip(image.instance.tolist(), image.axis, strict=True))
     return np.array([known.get(int(number), [np.nan, np.nan]) for number in instance], np.float32).reshape(-1, 2)

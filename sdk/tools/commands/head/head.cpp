@@ -154,7 +154,7 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     std::stable_sort(photo.heads.begin(), photo.heads.end(),
                      [&](const BoxPx& a, const BoxPx& b) { return area(a) > area(b); });
   }
-  // Frames of a clip where nobody was found tell nothing, where somebody was found elsewhere.
+  // Leaves out frames of clips without a head where any photo shows one.
   const auto shows_somebody = [](const Photo& photo) { return !photo.heads.empty(); };
   if (std::any_of(photos.begin(), photos.end(), shows_somebody)) {
     const auto is_empty = [&](const Photo& photo) { return photo.is_of_clip && !shows_somebody(photo); };

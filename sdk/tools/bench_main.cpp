@@ -1,7 +1,6 @@
-// `maquette bench`: how long each stage of a frame takes on this machine.
+// `maquette bench`: how long each stage of a frame takes on this machine; of prediction in bench/prediction_bench.cpp.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -12,6 +11,8 @@
 
 #include "arguments/model_options.h"
 #include "arguments/source_argument.h"
+#include "bench/prediction_bench.h"
+#include "bench/stage_times.h"
 #include "interrupt.h"
 #include "machine.h"
 #include "output/output_file.h"
@@ -25,8 +26,6 @@ constexpr const char* kSchema = "maquette-bench-3";
 // Sources are measured alternately, in blocks of so many frames, so that a busy moment of the machine meets all of
 // them.
 constexpr int kBlock = 10;
-constexpr double kMaxOthers = 0.05;  // of all cores: more, and the figures are of other processes too
-constexpr double kMaxSpread = 1.5;   // p90 by p50
 constexpr double kMibibyte = 1024.0 * 1024.0;
 
 struct Options {
@@ -41,14 +40,9 @@ struct Options {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
-double ms_between(Clock::time_point from, Clock::time_point to) {
-  return std::chrono::duration<double, std::milli>(to - from).count();
-}
-
 // The stages of a frame in their order: taking it from the source, those of maq_densepose_stats, and all of it.
-constexpr const char* kStages[] = {"capture",    "preprocess", "trunk",  "proposals", "box_head",
-                                   "dense_head", "crops",      "decode", "frame"};
-constexpr size_t kStageCount = std::size(kStages);
+const std::vector<const char*> kStages = {"capture",    "preprocess", "trunk",  "proposals", "box_head",
+                                          "dense_head", "crops",      "decode", "frame"};
 
 // One source with the times of its frames.
 class Case {
@@ -56,8 +50,7 @@ class Case {
   Case(const maquette::Context& context, std::string uri) : context_(context), uri_(std::move(uri)) { open(); }
 
   const std::string& uri() const { return uri_; }
-  size_t runs() const { return ms_[0].size(); }
-  double seconds() const { return seconds_; }
+  const StageTimes& times() const { return times_; }
 
   // Takes the next frame, from the start again after the last one, and finds its people. Returns how long it took.
   // Nothing when the program was interrupted.
@@ -86,12 +79,9 @@ class Case {
     const double total_ms = ms_between(start, done);
     if (!counted) return total_ms;
 
-    const double values[kStageCount] = {ms_between(start, taken), stats.preprocess_ms, stats.trunk_ms,
-                                        stats.proposals_ms,       stats.box_head_ms,   stats.dense_head_ms,
-                                        stats.crops_ms,           stats.decode_ms,     total_ms};
-    for (size_t i = 0; i < kStageCount; ++i) ms_[i].push_back(values[i]);
-    seconds_ += total_ms / 1e3;
-    cpu_s_ += own_processor_seconds() - cpu_before_s;
+    times_.add({ms_between(start, taken), stats.preprocess_ms, stats.trunk_ms, stats.proposals_ms, stats.box_head_ms,
+                stats.dense_head_ms, stats.crops_ms, stats.decode_ms, total_ms},
+               own_processor_seconds() - cpu_before_s);
     people_ += stats.person_count;
     return total_ms;
   }
@@ -99,60 +89,26 @@ class Case {
   // Frames of a live source that pass between two blocks are not dropped ones.
   void pause() { last_sequence_.reset(); }
 
-  double percentile(size_t stage, double percent) const {
-    std::vector<double> sorted = ms_[stage];
-    if (sorted.empty()) return 0;
-    std::sort(sorted.begin(), sorted.end());
-    const double at = percent / 100 * double(sorted.size() - 1);
-    const size_t low = size_t(at);
-    const size_t high = std::min(low + 1, sorted.size() - 1);
-    return sorted[low] + (sorted[high] - sorted[low]) * (at - double(low));
-  }
-  double frame_ms() const { return percentile(kStageCount - 1, 50); }
   const maq_densepose_stats& latest() const { return stats_; }
-  double people() const { return double(people_) / double(std::max<size_t>(1, runs())); }
-  double cpu_ms() const { return 1e3 * cpu_s_ / double(std::max<size_t>(1, runs())); }
-
-  // Why the times are unreliable; empty if they are not.
-  std::vector<std::string> warnings(const Options& options) const {
-    std::vector<std::string> reasons;
-    char text[128];
-    if (runs() < size_t(options.runs) || seconds_ < options.seconds) {
-      std::snprintf(text, sizeof text, "%zu runs in %.1f s, %d and %.1f s asked for", runs(), seconds_, options.runs,
-                    options.seconds);
-      reasons.emplace_back(text);
-    }
-    const double spread = percentile(kStageCount - 1, 90) / std::max(1e-6, frame_ms());
-    if (spread > kMaxSpread) {
-      std::snprintf(text, sizeof text, "p90 is %.2f times p50, %.2f allowed", spread, kMaxSpread);
-      reasons.emplace_back(text);
-    }
-    return reasons;
-  }
+  double people() const { return double(people_) / double(std::max<size_t>(1, times_.runs())); }
 
   Json json(const Options& options) const {
-    Json ms;
-    for (size_t i = 0; i < kStageCount; ++i) {
-      for (const int percent : {50, 90, 99}) {
-        ms[kStages[i]]["p" + std::to_string(percent)] = rounded_ms(percentile(i, percent));
-      }
-    }
-    const std::vector<std::string> reasons = warnings(options);
+    const std::vector<std::string> reasons = times_.warnings(options.runs, options.seconds);
     return {{"source", uri_},
             {"size_px", size_px_},
             {"network_px", {stats_.network_width_px, stats_.network_height_px}},
             {"provider", name_of(stats_.provider)},
             {"threads", stats_.threads},
             {"threads_measured", stats_.is_threads_measured != 0},
-            {"runs", runs()},
-            {"seconds", seconds_},
+            {"runs", times_.runs()},
+            {"seconds", times_.seconds()},
             {"people", people()},
             {"proposals", stats_.proposal_count},
             {"dropped_frames", dropped_frames_},
-            {"ms", ms},
-            {"fps", 1e3 / std::max(1e-6, frame_ms())},
-            {"cpu_ms", cpu_ms()},
-            {"cores_busy", cpu_s_ / std::max(1e-6, seconds_)},
+            {"ms", times_.ms_json()},
+            {"fps", times_.runs_per_second()},
+            {"cpu_ms", times_.processor_ms()},
+            {"cores_busy", times_.cores_busy()},
             {"valid", reasons.empty()},
             {"warnings", reasons}};
   }
@@ -169,12 +125,10 @@ class Case {
   std::string uri_;
   std::unique_ptr<maquette::Source> source_;
   std::optional<StoppedByInterrupt> stopped_;
-  std::vector<double> ms_[kStageCount];
+  StageTimes times_{kStages};
   maq_densepose_stats stats_{};
   std::array<int32_t, 2> size_px_{};
   std::optional<uint64_t> last_sequence_;
-  double seconds_ = 0;
-  double cpu_s_ = 0;
   int64_t people_ = 0;
   uint64_t dropped_frames_ = 0;
 };
@@ -183,14 +137,16 @@ void print_table(const std::vector<std::unique_ptr<Case>>& cases) {
   size_t widest = 6;
   for (const auto& timed : cases) widest = std::max(widest, timed->uri().size());
   print_output("%-*s  people    FPS    p50    p90    p99 ms   CPU ms |", int(widest), "source");
-  for (size_t i = 0; i + 1 < kStageCount; ++i) print_output(" %s", kStages[i]);
+  const size_t whole = kStages.size() - 1;
+  for (size_t i = 0; i < whole; ++i) print_output(" %s", kStages[i]);
   print_output("\n");
   for (const auto& timed : cases) {
+    const StageTimes& times = timed->times();
     print_output("%-*s  %6.2f %6.1f %6.1f %6.1f %6.1f %11.1f |", int(widest), timed->uri().c_str(), timed->people(),
-                 1e3 / std::max(1e-6, timed->frame_ms()), timed->frame_ms(), timed->percentile(kStageCount - 1, 90),
-                 timed->percentile(kStageCount - 1, 99), timed->cpu_ms());
-    for (size_t i = 0; i + 1 < kStageCount; ++i) {
-      print_output(" %*.1f", int(std::char_traits<char>::length(kStages[i])), timed->percentile(i, 50));
+                 times.runs_per_second(), times.median_ms(), times.percentile_ms(whole, 90),
+                 times.percentile_ms(whole, 99), times.processor_ms());
+    for (size_t i = 0; i < whole; ++i) {
+      print_output(" %*.1f", int(std::char_traits<char>::length(kStages[i])), times.percentile_ms(i, 50));
     }
     print_output("\n");
   }
@@ -217,11 +173,10 @@ int run_bench(const Options& options) {
   for (const auto& timed : cases) {
     for (int i = 0; i < options.warm_up && !interrupted(); ++i) timed->run(densepose, false);
   }
-  const double others_before_s = others_processor_seconds();
-  const auto measured_from = Clock::now();
+  const OtherProcesses other_processes;
   ProgressBar progress("measuring", int64_t(cases.size()) * options.runs);
   const auto unfinished = [&](const Case& timed) {
-    return timed.runs() < size_t(options.runs) || timed.seconds() < options.seconds;
+    return timed.times().runs() < size_t(options.runs) || timed.times().seconds() < options.seconds;
   };
   int64_t done = 0;
   for (bool any = true; any && !interrupted();) {
@@ -237,24 +192,12 @@ int run_bench(const Options& options) {
     }
   }
   progress.finish();
-  const double others_s = others_processor_seconds() - others_before_s;
-  const double wall_s = ms_between(measured_from, Clock::now()) / 1e3;
-
-  Json machine = describe_machine();
-  const double others = std::max(0.0, others_s) / (std::max(1e-3, wall_s) * machine.at("cores").get<double>());
-  std::vector<std::string> reasons;
-  if (others > kMaxOthers) {
-    char text[128];
-    std::snprintf(text, sizeof text, "other processes used %.0f %% of the CPU", 100 * others);
-    reasons.emplace_back(text);
-  }
+  const double others = other_processes.cpu_fraction();
+  const std::vector<std::string> reasons = OtherProcesses::warnings(others);
   Json document;
   document["schema"] = kSchema;
-  document["machine"] = machine;
-  document["build"] = {{"sdk", maq_get_sdk_version()},
-                       {"commit", maq_get_git_commit()},
-                       {"options", maq_get_build_options()},
-                       {"onnxruntime", context.onnxruntime_version()}};
+  document["machine"] = describe_machine();
+  document["build"] = describe_build(context);
   document["bundle"] = bundle;
   const bool measures_threads = options.model.threads == MAQ_THREADS_MEASURED;
   document["settings"] = {{"threads", measures_threads ? Json("measured") : Json(options.model.threads)},
@@ -287,7 +230,7 @@ int run_bench(const Options& options) {
   if (measures_threads) print_output("Threads, measured: %d\n", cases[0]->latest().threads);
   for (const std::string& reason : reasons) print_output("Warning: %s\n", reason.c_str());
   for (const auto& timed : cases) {
-    for (const std::string& reason : timed->warnings(options)) {
+    for (const std::string& reason : timed->times().warnings(options.runs, options.seconds)) {
       print_output("Warning: %s: %s\n", timed->uri().c_str(), reason.c_str());
     }
   }
@@ -303,25 +246,62 @@ int run_bench(const Options& options) {
 int main(int argc, char** argv) try {
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");
   Options options;
-  app.add_option("source", options.sources,
-                 "Images, clips or URIs, measured alternately; default: one, four and no people of stub:people");
+  PredictionBenchOptions prediction;
+  bool predicts = false;
+  std::vector<std::string> sources;
+  app.add_option("source", sources,
+                 "Images, clips or URIs, measured alternately; default: one, four and no people of stub:people. With "
+                 "--predict one clip or camera; default: two people of stub:people");
+  CLI::Option* const predict = app.add_flag(
+      "--predict", predicts,
+      "Measure prediction instead of dense pose: the surprise of a frame that arrives, the next picture by "
+      "motion, and pictures drawn by networks (docs/prediction.md)");
   app.add_option("--json", options.json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
-  app.add_option("--warm-up", options.warm_up, "Frames of each source that are not counted (default 10)")
+  for (const char* of_dense_pose : {"--no-spin", "--provider", "--size", "--threshold", "--max-proposals",
+                                    "--key-frames", "--min-person-height", "--crops", "--crop-size", "--no-surface"}) {
+    app.get_option(of_dense_pose)->excludes(predict);
+  }
+  app.add_option("--warm-up", options.warm_up, "Frames of each source, or case, that are not counted (default 10)")
       ->check(CLI::Range(0, 100000));
-  app.add_option("--runs", options.runs, "Minimum number of frames of each source (default 100)")
-      ->check(CLI::Range(1, 1000000));
-  app.add_option("--seconds", options.seconds, "Minimum time of each source in seconds (default 3)")
+  CLI::Option* const runs =
+      app.add_option("--runs", options.runs,
+                     "Minimum number of frames of each source (default 100), or runs of each case (default 20)")
+          ->check(CLI::Range(1, 1000000));
+  app.add_option("--seconds", options.seconds, "Minimum time of each source, or case, in seconds (default 3)")
       ->check(CLI::Range(0.0, 86400.0));
   app.footer(
       "A frame is counted from asking the source for it to having the result. CPU ms is the CPU time of all threads\n"
       "for one frame, a measure of its energy on every machine. Compare figures of one run; a warning says why\n"
       "times are unreliable: other processes busy, few runs, wide spread.\n\n"
+      "With --predict all cases go alternately through the same 16 frames of the source, held in memory: surprise and\n"
+      "motion at their size, what is drawn by networks at 64 x 64. A run of surprise is a frame with its map; of the\n"
+      "others a frame that is pushed and the next picture made of it, or 11 of each sample, of which one is made.\n\n"
       "Examples:\n"
       "  maquette bench\n"
-      "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json");
+      "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json\n"
+      "  maquette bench --predict                             # a minute; surprise and pictures a second\n"
+      "  maquette bench --predict clip.mp4 --threads 1 --json bench.json");
   int exit_code = 0;
-  app.callback([&] { exit_code = run_bench(options); });
+  app.callback([&] {
+    if (!predicts) {
+      if (!sources.empty()) options.sources = sources;
+      exit_code = run_bench(options);
+      return;
+    }
+    if (sources.size() > 1) throw std::runtime_error("--predict measures one source; name one clip or camera.");
+    if (options.model.threads == MAQ_THREADS_MEASURED) {
+      throw std::runtime_error("--predict takes a number of --threads, 1 to 64.");
+    }
+    if (!sources.empty()) prediction.source = sources.front();
+    prediction.bundle = options.model.bundle;
+    prediction.json = options.json;
+    prediction.threads = options.model.threads;
+    prediction.warm_up = options.warm_up;
+    if (!runs->empty()) prediction.runs = options.runs;
+    prediction.seconds = options.seconds;
+    exit_code = run_prediction_bench(prediction);
+  });
   return run_program(app, argc, argv, &exit_code);
 } catch (const std::exception& error) {  // no memory for the options
   return report(error);

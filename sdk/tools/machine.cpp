@@ -72,6 +72,13 @@ nlohmann::ordered_json describe_machine() {
           {"load", knows_load ? nlohmann::ordered_json(load) : nlohmann::ordered_json()}};
 }
 
+nlohmann::ordered_json describe_build(const maquette::Context& context) {
+  return {{"sdk", maq_get_sdk_version()},
+          {"commit", maq_get_git_commit()},
+          {"options", maq_get_build_options()},
+          {"onnxruntime", context.onnxruntime_version()}};
+}
+
 double own_processor_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
 double others_processor_seconds() {

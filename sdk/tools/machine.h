@@ -2,11 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <maquette/maquette.hpp>
 #include <nlohmann/json.hpp>
 
 // Processor, cores, instruction sets that matter to networks, memory, system, frequency governor and load. What the
 // system does not say is null.
 nlohmann::ordered_json describe_machine();
+
+// Version, commit and options of the SDK, and the version of ONNX Runtime.
+nlohmann::ordered_json describe_build(const maquette::Context& context);
 
 // Seconds that processors worked for this process, all threads, since it started.
 double own_processor_seconds();

@@ -7,7 +7,7 @@
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -76,12 +76,18 @@ maquette::Predictor make_predictor(const maquette::Context& context, const Predi
   return maquette::Predictor(context, config);
 }
 
-// Beside one another, each with its name.
-cv::Mat side_by_side(const std::vector<std::pair<std::string, cv::Mat>>& pictures) {
-  std::vector<cv::Mat> named;
-  for (const auto& [name, picture] : pictures) {
-    named.push_back(picture.clone());
-    draw_caption(name, named.back());
+// Beside one another, each with its name, and smaller where the row would not fit into what is written.
+cv::Mat side_by_side(const std::vector<std::pair<std::string, cv::Mat>>& pictures, const PredictedPictures& written) {
+  const cv::Size size = written.size_in_row(pictures.front().second.size(), pictures.size());
+  std::vector<cv::Mat> named(pictures.size());
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    const auto& [name, picture] = pictures[i];
+    if (picture.size() == size) {
+      named[i] = picture.clone();
+    } else {
+      cv::resize(picture, named[i], size, 0, 0, cv::INTER_AREA);
+    }
+    draw_caption(name, named[i]);
   }
   cv::Mat row;
   cv::hconcat(named, row);
@@ -201,7 +207,7 @@ int predict(const PredictOptions& options) {
     const size_t columns = compared + (samples ? size_t(samples->count()) + 1 : 0);
     for (const cv::Mat& picture : before) {
       const std::vector<std::pair<std::string, cv::Mat>> row(columns, {"seen", picture});
-      pictures.add_to_clip(is_row ? side_by_side(row) : picture);
+      pictures.add_to_clip(is_row ? side_by_side(row, pictures) : picture);
     }
   }
   std::vector<Ahead> found;
@@ -253,7 +259,7 @@ int predict(const PredictOptions& options) {
       columns.emplace_back(text, draw_uncertainty(bits, picture));
     }
     if (is_row && (options.compare || pictures.is_clip())) {
-      const cv::Mat row = side_by_side(columns);
+      const cv::Mat row = side_by_side(columns, pictures);
       if (pictures.is_clip()) {
         pictures.add_to_clip(row);
       } else if (!options.out.empty()) {
@@ -316,7 +322,7 @@ void add_predict_command(CLI::App& app, int* exit_code) {
   for_pictures(command->add_flag(
       "-c,--compare", options->compare,
       "Print the error (PSNR) of last and motion by time ahead, and draw truth and all of them side by "
-      "side"));
+      "side, smaller where a clip takes no picture as wide"));
   CLI::Option* const samples =
       command->add_option("--samples", options->drawn.samples,
                           "Draw so many (1 to 16) of what may come by a network, and show how uncertain it is");

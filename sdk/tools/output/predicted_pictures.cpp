@@ -1,10 +1,20 @@
 #include "output/predicted_pictures.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "output/frame_image.h"
 #include "output/output_file.h"
+
+namespace {
+
+constexpr double kMaxMpeg4Side_px = 8190;  // sizes have 13 bits (ISO/IEC 14496-2, 6.2.3), and clips even ones
+constexpr double kMaxArea_px = 64e6;       // of a frame of the SDK
+
+}  // namespace
 
 PredictedPictures::PredictedPictures(const maquette::Context& context, const std::string& out, const std::string& stem,
                                      double fps)
@@ -20,8 +30,19 @@ PredictedPictures::PredictedPictures(const maquette::Context& context, const std
   }
 }
 
+cv::Size PredictedPictures::size_in_row(cv::Size size, size_t columns) const {
+  const double max_side = clip_ && out_.extension() == ".mp4" ? kMaxMpeg4Side_px : MAQ_MAX_SIDE_PX;
+  const double width = double(size.width) * double(columns), height = size.height;
+  const double scale = std::min({1.0, max_side / width, max_side / height, std::sqrt(kMaxArea_px / (width * height))});
+  if (scale == 1) return size;
+  return {std::max(1, int(scale * size.width)), std::max(2, int(scale * size.height))};
+}
+
 void PredictedPictures::add_to_clip(const cv::Mat& picture) {
-  clip_->add(frame_of(context_, picture));
+  cv::Mat fitting = picture;
+  const cv::Size size = size_in_row(picture.size(), 1);
+  if (size != picture.size()) cv::resize(picture, fitting, size, 0, 0, cv::INTER_AREA);
+  clip_->add(frame_of(context_, fitting));
   ++count_;
 }
 

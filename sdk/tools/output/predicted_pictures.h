@@ -14,7 +14,10 @@ class PredictedPictures {
   PredictedPictures(const maquette::Context& context, const std::string& out, const std::string& stem, double fps);
 
   bool is_clip() const { return clip_.has_value(); }
-  void add_to_clip(const cv::Mat& picture);
+  // The size that pictures of `size` get, of which `columns` stand beside one another, where the row must fit into the
+  // clip, or else into a frame; `size` where it does.
+  cv::Size size_in_row(cv::Size size, size_t columns) const;
+  void add_to_clip(const cv::Mat& picture);  // made smaller where it does not fit
   // The frame itself, with the mark in the file; or the pictures drawn side by side. `sample`: from 0; -1: none.
   void save(int64_t number, const maquette::Frame& frame, const cv::Mat* compared, int sample = -1);
   // "": nothing was asked for.

@@ -1,6 +1,7 @@
 // `maquette predict` as a person meets it: figures, clips, marked pictures, sentences.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -131,6 +132,20 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
   expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");
 }
 
+TEST_F(PredictCommandLine, AComparisonThatNoClipTakesIsDrawnSmaller) {
+  const Outcome result =
+      run("'stub:people?size=2652x64&fps=30' --from 2 --frames 1 --compare --out wide.mp4");  // 10,608 pixels in a row
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  cv::VideoCapture clip(folder_.file("wide.mp4"));
+  cv::Mat picture;
+  ASSERT_TRUE(clip.read(picture));
+  EXPECT_EQ(picture.size(), cv::Size(8188, 48));
+  ASSERT_EQ(run("'stub:people?size=9000x64&fps=30' --from 2 --frames 1 --out alone.mp4").exit_code, 0);
+  const Outcome rows = run("'stub:people?size=5000x64&fps=30' --from 2 --frames 1 --compare --out rows");
+  ASSERT_EQ(rows.exit_code, 0) << rows.err;
+  EXPECT_EQ(cv::imread(folder_.file("rows/stub_people_ahead_001.png")).cols, 4 * 4096);
+}
+
 TEST_F(PredictCommandLine, AfterTheEndThereIsNothingToCompareWith) {
   const Outcome result = run("square.avi --from 18 --frames 3 --compare");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -149,6 +164,66 @@ TEST_F(PredictCommandLine, PlayConcealsAStallAndCountsWhatItMadeUp) {
   const Outcome plain = run_program(folder_, "MAQ_BUNDLE=", "play " + stub + " --json b.json");
   ASSERT_EQ(plain.exit_code, 0) << plain.err;
   EXPECT_FALSE(nlohmann::json::parse(read_text(folder_.file("b.json"))).contains("concealed"));
+}
+
+TEST_F(PredictCommandLine, BenchMeasuresEachStageOfWhatIsPredicted) {
+  const std::string bundle = " --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle' --runs 2 --seconds 0 --warm-up 0 ";
+  const Outcome result = run_program(folder_, "MAQ_BUNDLE=", "bench --predict square.avi --json b.json" + bundle);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("4 samples take "), std::string::npos) << result.out;
+  const auto document = nlohmann::json::parse(read_text(folder_.file("b.json")));
+  EXPECT_EQ(document["schema"], "maquette-bench-prediction-1");
+  EXPECT_EQ(document["valid"], document["warnings"].empty());
+  EXPECT_TRUE(document["left_out"].empty()) << document["left_out"];
+  EXPECT_NEAR(document["settings"]["step_s"].get<double>(), 0.05, 1e-6);
+  EXPECT_GT(document["four_samples_times"].get<double>(), 0);
+  std::vector<std::string> names;
+  for (const auto& timed : document["cases"]) {
+    names.push_back(timed["name"]);
+    const bool is_drawn = timed.contains("samples");
+    EXPECT_EQ(timed["size_px"], is_drawn ? nlohmann::json({64, 64}) : nlohmann::json({160, 120})) << timed["name"];
+    EXPECT_GE(timed["runs"], 2);
+    double stages = 0;
+    for (const auto& [name, ms] : timed["ms"].items()) {
+      EXPECT_LE(ms["p50"], ms["p99"]) << name;
+      if (name != "frame") stages += ms["p50"].get<double>();
+    }
+    EXPECT_GT(stages, 0);
+    EXPECT_LT(stages, 1.5 * timed["ms"]["frame"]["p90"].get<double>()) << timed["name"];
+    for (const auto& warning : timed["warnings"]) {
+      EXPECT_EQ(warning.get<std::string>().find("nothing moved"), std::string::npos) << "the square does";
+    }
+  }
+  EXPECT_EQ(names.size(), 9u);
+  EXPECT_EQ(names.front(), "surprise");
+}
+
+TEST_F(PredictCommandLine, BenchSaysWhatItCannotMeasure) {
+  const auto bench = [&](const std::string& arguments) {
+    return run_program(folder_, "MAQ_BUNDLE=", "bench --predict --runs 1 --seconds 0 --warm-up 0 " + arguments);
+  };
+  const Outcome table_alone = bench("square.avi --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'");
+  EXPECT_EQ(table_alone.exit_code, 0) << table_alone.err;
+  EXPECT_NE(table_alone.out.find("Frames are not drawn: "), std::string::npos) << table_alone.out;
+  EXPECT_EQ(table_alone.out.find("next drawn"), std::string::npos) << table_alone.out;
+  const cv::Mat grey(48, 64, CV_8UC3, cv::Scalar::all(90));
+  cv::VideoWriter clip(folder_.file("still.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, grey.size());
+  for (int i = 0; i < 16; ++i) clip.write(grey);
+  clip.release();
+  const Outcome still = bench("still.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
+  EXPECT_NE(still.out.find("nothing moved in 10 frames, so that no network ran"), std::string::npos) << still.out;
+  cv::imwrite(folder_.file("photo.png"), grey);
+  for (const auto& [arguments, text] : {std::pair{"photo.png", "photo has 1 of the 16 frames"},
+                                        {"square.avi square.avi", "one source"},
+                                        {"square.avi --threads measured", "--threads, 1 to 64"},
+                                        {"square.avi --bundle nowhere", "nowhere"}}) {
+    const Outcome result = bench(arguments);
+    EXPECT_EQ(result.exit_code, 1) << arguments;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  EXPECT_EQ(bench("square.avi --key-frames 2").exit_code, 2) << "of dense pose";
+  EXPECT_NE(bench("--help").out.find("maquette bench --predict clip.mp4"), std::string::npos);
 }
 
 TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {
@@ -177,6 +252,27 @@ TEST_F(PredictCommandLine, SaysHowSurprisingFramesAre) {
   const Outcome summary = run("square.avi --surprise --max-frames 12");
   ASSERT_EQ(summary.exit_code, 0) << summary.err;
   EXPECT_NE(summary.out.find("12 frames"), std::string::npos) << summary.out;
+}
+
+TEST_F(PredictCommandLine, SaysHowSurprisingACameraIsAlsoWhenItWasAway) {
+  const Outcome lines =
+      run("'stub:people?size=64x48&fps=50&live=1&unplug=200ms@10' --surprise --json --max-frames 20 --bundle "
+          "'" MAQ_TEST_DATA "/tiny_prediction/bundle'");
+  ASSERT_EQ(lines.exit_code, 0) << lines.err;
+  EXPECT_NE(lines.err.find("unplugged"), std::string::npos) << lines.err;
+  std::istringstream text(lines.out);
+  int64_t before_ns = 0, longest_ns = 0;
+  int frames = 0;
+  for (std::string line; std::getline(text, line); ++frames) {
+    const auto frame = nlohmann::json::parse(line);
+    const int64_t time_ns = frame["timestamp_ns"];
+    EXPECT_GT(time_ns, before_ns);
+    if (frames > 0) longest_ns = std::max(longest_ns, time_ns - before_ns);
+    EXPECT_TRUE(frames > 0 || frame["start"]);
+    before_ns = time_ns;
+  }
+  EXPECT_EQ(frames, 20);
+  EXPECT_GT(longest_ns, 150000000) << "no line for frames that did not come";
 }
 
 TEST_F(PredictCommandLine, NamesTheEventsOfAClip) {

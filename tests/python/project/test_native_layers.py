@@ -90,6 +90,7 @@ TOOLS_MAY_INCLUDE = {
     ".": set(),
     "arguments": {"."},
     "output": {"."},
+    "bench": {".", "arguments", "output"},
     "commands": {".", "arguments", "output"},
     "commands/head": {".", "arguments", "commands", "output"},
 }

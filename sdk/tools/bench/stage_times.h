@@ -1,0 +1,51 @@
+// Times of a case of `maquette bench`: those of its stages, run by run, and why they may be unreliable.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+double ms_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to);
+
+class StageTimes {
+ public:
+  // `stages` in their order; the last one is all of a run.
+  explicit StageTimes(std::vector<const char*> stages) : stages_(std::move(stages)), ms_(stages_.size()) {}
+
+  // A run: a time for each stage, and what all threads worked meanwhile.
+  void add(const std::vector<double>& ms, double processor_s);
+
+  const std::vector<const char*>& stages() const { return stages_; }
+  size_t runs() const { return ms_[0].size(); }
+  double seconds() const { return seconds_; }
+  double percentile_ms(size_t stage, double percent) const;
+  double median_ms() const { return percentile_ms(stages_.size() - 1, 50); }
+  double runs_per_second() const;
+  double processor_ms() const;  // of a run
+
+  // Why the times are unreliable, where so many runs and seconds were asked for; empty if they are not.
+  std::vector<std::string> warnings(int min_runs, double min_seconds) const;
+  nlohmann::ordered_json ms_json() const;  // p50, p90 and p99 of each stage
+  double cores_busy() const;
+
+ private:
+  std::vector<const char*> stages_;
+  std::vector<std::vector<double>> ms_;
+  double seconds_ = 0, processor_s_ = 0;
+};
+
+// What other processes took of the processors since it was made.
+class OtherProcesses {
+ public:
+  OtherProcesses();
+
+  double cpu_fraction() const;  // of all cores
+  // Why times of a measurement that took so much beside it are unreliable; empty if they are not.
+  static std::vector<std::string> warnings(double cpu_fraction);
+
+ private:
+  double before_s_;
+  std::chrono::steady_clock::time_point from_;
+};

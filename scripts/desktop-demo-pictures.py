@@ -81,7 +81,7 @@ def main() -> None:
     def keep(name: str, picture: np.ndarray) -> None:
         cv2.imwrite(str(options.out / name), picture, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
-    with tempfile.TemporaryDirectory() as temporary, tqdm(total=22, unit="picture") as progress:
+    with tempfile.TemporaryDirectory() as temporary, tqdm(total=23, unit="picture") as progress:
 
         def run(source: tuple[str, int], *arguments: str) -> np.ndarray:
             picture, _ = shown(*source, Path(temporary), *arguments)
@@ -101,6 +101,7 @@ def main() -> None:
         keep("desktop-demo-next.jpg", bridged(Path(temporary)))
         progress.update()
         keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--next", "--surprise"))
+        keep("desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--next", "--uncertainty", "--sample", "--ahead", "300"))
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

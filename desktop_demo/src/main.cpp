@@ -27,7 +27,7 @@ int main(int argc, char** argv) try {
   options.scene_bundle = shared_file("MAQ_SCENE_BUNDLE", "models/scenes-int8");
   options.heads_bundle = shared_file("MAQ_HEADS_BUNDLE", "models/heads-int8");
   options.edges_bundle = shared_file("MAQ_EDGES_BUNDLE", "models/edges-int8");
-  options.prediction.surprise_bundle = shared_file("MAQ_PREDICTION_BUNDLE", "models/prediction-int8");
+  options.prediction.bundle = shared_file("MAQ_PREDICTION_BUNDLE", "models/prediction-int8");
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
@@ -90,7 +90,13 @@ int main(int argc, char** argv) try {
   cli.add_flag("--surprise", options.prediction.finds_surprise,
                "How surprising each frame is: where, a curve, and the events that stood out")
       ->needs(next);
-  cli.add_option("--prediction-bundle", options.prediction.surprise_bundle, "Folder of the network for surprise");
+  cli.add_flag("--uncertainty", options.prediction.finds_uncertainty,
+               "What of the coming picture is uncertain, in red, as networks foresee it")
+      ->needs(next);
+  cli.add_flag("--sample", options.prediction.draws_sample, "A picture that may come, drawn by networks, beside them")
+      ->needs(next);
+  cli.add_option("--prediction-bundle", options.prediction.bundle,
+                 "Folder of the networks for surprise, uncertainty and samples");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");

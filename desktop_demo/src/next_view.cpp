@@ -2,9 +2,12 @@
 
 #include <GLFW/glfw3.h>
 #include <imgui.h>
+#include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
+#include "drawing/red_cells.h"
 #include "drawing/surprise_drawing.h"
 
 namespace {
@@ -14,10 +17,24 @@ constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:peop
 constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait"};
 constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // of what drags and arrows turn elsewhere
+constexpr Reddening kUncertainRed = {1, 6, 0.6f};
+constexpr double kFreshMs = 500,
+                 kStaleMs = 2000;  // age of uncertainty from which on its red fades, and where none is left
 constexpr ImU32 kMadeUpColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
 
-std::string predicted_text(double ahead_s) {
-  return "predicted +" + std::to_string(std::lround(ahead_s * 1e3)) + " ms";
+std::string ahead_text(double ahead_s) { return "+" + std::to_string(std::lround(ahead_s * 1e3)) + " ms"; }
+
+std::string predicted_text(double ahead_s) { return "predicted " + ahead_text(ahead_s); }
+
+// What is old says little of the picture that it lies over.
+Reddening uncertain_red(double age_ms) {
+  Reddening red = kUncertainRed;
+  red.max_red *= float(std::clamp((kStaleMs - age_ms) / (kStaleMs - kFreshMs), 0.0, 1.0));
+  return red;
+}
+
+double mean_bits(const maquette::DrawnFuture& drawn) {
+  return std::accumulate(drawn.bits.begin(), drawn.bits.end(), 0.0) / double(std::max<size_t>(1, drawn.bits.size()));
 }
 
 std::string method_text(const maq_predictor_stats& stats) {
@@ -44,13 +61,17 @@ NextView::NextView(const maquette::Context& context, const Options& options, con
 // Meanwhile others drew into the textures.
 void NextView::set_visible(bool is_visible) {
   LiveView::set_visible(is_visible);
-  if (is_visible && frame().number > 0) painter_.set_scene(frame().next, frame().now);
+  if (is_visible && frame().number > 0) {
+    painter_.set_scene(frame().next, frame().now);
+    painter_.set_sample(frame().drawn.picture);
+  }
 }
 
 bool NextView::update() {
   note_end();
   if (!frames_.take()) return false;
   painter_.set_scene(frame().next, frame().now);
+  painter_.set_sample(frame().drawn.picture);
   const maq_predictor_stats& s = frame().stats;
   stages_.add({s.grey_ms, s.flow_ms, s.choice_ms, s.project_ms, s.fetch_ms, float(frame().waiting_ms)});
   return true;
@@ -60,6 +81,8 @@ Action NextView::press(int key) {
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_3) choice_.method = maq_prediction_method(key - GLFW_KEY_1);
   if (key == GLFW_KEY_B) choice_.bridges_gaps = !choice_.bridges_gaps;
   if (key == GLFW_KEY_S) choice_.finds_surprise = !choice_.finds_surprise;
+  if (key == GLFW_KEY_U) choice_.finds_uncertainty = !choice_.finds_uncertainty;
+  if (key == GLFW_KEY_D) choice_.draws_sample = !choice_.draws_sample;
   live_.set_choice(choice_);
   return LiveView::press(key);
 }
@@ -71,19 +94,28 @@ void NextView::steer(const Steering& steering, const Rect&) {
   live_.set_choice(choice_);
 }
 
-// Beside each other or one below the other, whichever is larger; the curve of surprise below both.
+// In as many columns as make them largest; the curve of surprise below all.
 void NextView::place(Rect area) {
   const int curve_height = choice_.finds_surprise ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
   area.height -= curve_height;
-  const int width = frame().now.width_px, height = frame().now.height_px;
-  const Rect beside = Rect{0, 0, area.width / 2, area.height}.fit(width, height);
-  const Rect below = Rect{0, 0, area.width, area.height / 2}.fit(width, height);
-  const bool is_beside = beside.width >= below.width;
-  const Rect& one = is_beside ? beside : below;
-  const int all_width = is_beside ? 2 * one.width : one.width, all_height = is_beside ? one.height : 2 * one.height;
+  const int pictures = choice_.draws_sample ? 3 : 2;
+  Rect one;
+  int columns = 0, rows = 0;
+  for (int tried = pictures; tried >= 1; --tried) {
+    const int tried_rows = (pictures + tried - 1) / tried;
+    const Rect fitting =
+        Rect{0, 0, area.width / tried, area.height / tried_rows}.fit(frame().now.width_px, frame().now.height_px);
+    if (columns != 0 && fitting.width <= one.width) continue;
+    one = fitting, columns = tried, rows = tried_rows;
+  }
+  const int all_width = columns * one.width, all_height = rows * one.height;
   image_rect_ = {area.x + (area.width - all_width) / 2, area.y + (area.height - all_height) / 2, all_width, all_height};
-  now_rect_ = {image_rect_.x, image_rect_.y, one.width, one.height};
-  next_rect_ = {image_rect_.x + all_width - one.width, image_rect_.y + all_height - one.height, one.width, one.height};
+  const auto rect_of = [&](int picture) {
+    return Rect{image_rect_.x + picture % columns * one.width, image_rect_.y + picture / columns * one.height,
+                one.width, one.height};
+  };
+  now_rect_ = rect_of(0), next_rect_ = rect_of(1);
+  sample_rect_ = choice_.draws_sample ? rect_of(2) : Rect{};
   curve_rect_ = {image_rect_.x, image_rect_.y + all_height, all_width, curve_height};
   image_rect_.height += curve_height;
 }
@@ -99,8 +131,21 @@ void NextView::draw(const Rect& area) {
     draw_surprise_curve(frame().surprise, curve_rect_, window_.scale());
   }
   mark(now_rect_, is_bridged, is_bridged ? predicted_text(double(frame().origin.horizon_ns) / 1e9) : "now");
-  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + method_text(frame().stats));
+  const bool is_drawn = frame().drawn.number > 0;
+  if (choice_.finds_uncertainty && is_drawn) {
+    const auto columns = int(std::lround(std::sqrt(double(frame().drawn.bits.size()))));
+    draw_red_cells(frame().drawn.bits, columns, uncertain_red(frame().drawn_age_ms), next_rect_);
+  }
+  const std::string age =
+      choice_.finds_uncertainty ? is_drawn ? "; red: uncertain, " + age_text() : "; no uncertainty yet" : "";
+  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + method_text(frame().stats) + age);
+  if (!choice_.draws_sample || !is_drawn || frame().drawn.picture.empty()) return;
+  painter_.draw_sample(sample_rect_);
+  mark(sample_rect_, true, "one that may come " + ahead_text(frame().drawn.ahead_s) + ", " + age_text());
 }
+
+// Of what was drawn by networks, which come after the picture.
+std::string NextView::age_text() const { return std::to_string(std::lround(frame().drawn_age_ms)) + " ms old"; }
 
 void NextView::mark(const Rect& rect, bool is_predicted, const std::string& text) const {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
@@ -135,6 +180,15 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
                         {"bridged_frames", frame().gaps.predicted_count},
                         {"latest_gap_ms", frame().gaps.latest_gap_ms}};
   json["surprise"] = surprise_report(frame());
+  const maquette::DrawnFuture& drawn = frame().drawn;
+  json["drawn"] = {{"number", drawn.number}};
+  if (drawn.number > 0) {
+    json["sample_px"] = window_.in_pixels(sample_rect_).numbers();
+    json["drawn"] = {
+        {"number", drawn.number},         {"ahead_ms", drawn.ahead_s * 1e3},
+        {"age_ms", frame().drawn_age_ms}, {"draw_ms", drawn.draw_ms},
+        {"bits", mean_bits(drawn)},       {"picture_px", {drawn.picture.width_px, drawn.picture.height_px}}};
+  }
 }
 
 Action NextView::draw_panel() {
@@ -163,6 +217,7 @@ Action NextView::draw_panel() {
   changed |= ImGui::Checkbox("Bridge gaps (B)", &choice_.bridges_gaps);
   draw_gaps();
   changed |= ImGui::Checkbox("Surprise (S)", &choice_.finds_surprise);
+  changed |= draw_uncertainty();
   if (changed) live_.set_choice(choice_);
   if (choice_.finds_surprise) draw_surprise_text(frame(), window_.scale());
   ImGui::Separator();
@@ -179,4 +234,14 @@ void NextView::draw_gaps() {
   }
   ImGui::Text("%llu frames bridged, latest gap %.0f ms", static_cast<unsigned long long>(frame().gaps.predicted_count),
               double(frame().gaps.latest_gap_ms));
+}
+
+// True when a switch was changed.
+bool NextView::draw_uncertainty() {
+  bool changed = ImGui::Checkbox("Uncertainty (U)", &choice_.finds_uncertainty);
+  changed |= ImGui::Checkbox("One that may come, drawn (D)", &choice_.draws_sample);
+  const maquette::DrawnFuture& drawn = frame().drawn;
+  if (drawn.number == 0) return changed;
+  ImGui::Text("%.2f bits a code, drawn in %.0f ms, %.0f ms ago", mean_bits(drawn), drawn.draw_ms, frame().drawn_age_ms);
+  return changed;
 }

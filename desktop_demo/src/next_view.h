@@ -1,8 +1,9 @@
-// A source and, beside it, what it will show a moment later; its short gaps are bridged, and how surprising it is is
-// drawn over and below it, when the user wants it. What is made up has a border in magenta and says so.
+// A source and, beside it, what it will show a moment later. When the user wants it, its short gaps are bridged, how
+// surprising it is is drawn over and below it, how uncertain what comes is over that, and beside them a picture that
+// may come. What is made up has a border in magenta and says so.
 #pragma once
 
-#include <app/live_prediction.h>
+#include <app/prediction/live_prediction.h>
 #include <app/triple_buffer.h>
 #include <algorithm>
 
@@ -26,10 +27,12 @@ class NextView final : public LiveView {
   const maquette::PredictionFrame& frame() const { return frames_.front(); }
   void place(Rect area);
   void mark(const Rect& rect, bool is_predicted, const std::string& text) const;
+  std::string age_text() const;
   void draw_gaps();
+  bool draw_uncertainty();
 
   maquette::PredictionChoice choice_;
-  Rect now_rect_, next_rect_, curve_rect_;
+  Rect now_rect_, next_rect_, sample_rect_, curve_rect_;
   maquette::TripleBuffer<maquette::PredictionFrame> frames_;
   maquette::LivePrediction live_;  // last: its thread uses the others
 };

@@ -4,7 +4,7 @@
 #include <app/edge_picture.h>
 #include <app/live_densepose.h>
 #include <app/live_edges.h>
-#include <app/live_prediction.h>
+#include <app/prediction/live_prediction.h>
 #include <array>
 #include <string>
 #include <vector>

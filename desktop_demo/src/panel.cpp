@@ -55,6 +55,7 @@ void Panel::draw_help(bool* is_open) const {
       {"1 to 3, C, B, K", "edges: depth, distance, plain; curves, boxes; planes are skipped"},
       {"F7", "what the source will show next, short gaps bridged; again: people"},
       {"1 to 3, B, S, arrows", "next: auto, last frame, motion; bridge gaps; surprise; how far ahead (or drag)"},
+      {"U, D", "next: what of it is uncertain, in red; a picture that may come, drawn"},
       {"F6", "into the panel: arrows, Space, Enter; again: back to the picture"},
       {"H, F11", "panel, full screen"},
       {"Ctrl+Q", "ends the program"}};

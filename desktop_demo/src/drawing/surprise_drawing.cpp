@@ -6,20 +6,17 @@
 #include <cstdio>
 #include <utility>
 
+#include "drawing/red_cells.h"
+
 namespace {
 
 using maquette::PredictionFrame;
 using maquette::SurpriseMoment;
 
-constexpr float kRedFromBits = 1, kRedBits = 8, kMaxRed = 0.7f;  // of a cell: where red begins, and where it is full
-constexpr double kMinBits = 0.03, kMaxBits = 12;                 // of the curve
+constexpr Reddening kSurpriseRed = {1, 8, 0.7f};
+constexpr double kMinBits = 0.03, kMaxBits = 12;  // of the curve
 constexpr size_t kMaxEventsListed = 5;
 constexpr ImU32 kEventColour = IM_COL32(230, 60, 60, 255);
-
-ImU32 red_of(float bits) {
-  const float red = kMaxRed * std::clamp((bits - kRedFromBits) / (kRedBits - kRedFromBits), 0.0f, 1.0f);
-  return IM_COL32(255, 0, 0, int(255 * red));
-}
 
 // 0 to 1 from the bottom to the top of the curve.
 float height_of(double bits) {
@@ -29,30 +26,10 @@ float height_of(double bits) {
 
 }  // namespace
 
-// Colours change smoothly between the middles of the cells, and not beyond the outer ones'.
 void draw_surprising_cells(const PredictionFrame& frame, const Rect& picture) {
   const maq_surprise_score& score = frame.surprise.back().score;
   if (score.is_start != 0) return;  // its bits are of another kind
-  ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const auto colour = [&](int row, int column) {
-    return red_of(frame.surprise_bits[size_t(std::clamp(row, 0, score.rows - 1)) * size_t(score.columns) +
-                                      size_t(std::clamp(column, 0, score.columns - 1))]);
-  };
-  // A line of the grid: the borders of the picture, and between them the middles.
-  const auto at = [](int i, int count, int from, int length) {
-    const float cell = std::clamp(float(i) - 0.5f, 0.0f, float(count));
-    return float(from) + cell * float(length) / float(count);
-  };
-  for (int row = 0; row <= score.rows; ++row) {
-    const float top = at(row, score.rows, picture.y, picture.height);
-    const float bottom = at(row + 1, score.rows, picture.y, picture.height);
-    for (int column = 0; column <= score.columns; ++column) {
-      const float left = at(column, score.columns, picture.x, picture.width);
-      const float right = at(column + 1, score.columns, picture.x, picture.width);
-      list->AddRectFilledMultiColor({left, top}, {right, bottom}, colour(row - 1, column - 1), colour(row - 1, column),
-                                    colour(row, column), colour(row, column - 1));
-    }
-  }
+  draw_red_cells(frame.surprise_bits, score.columns, kSurpriseRed, picture);
 }
 
 void draw_surprise_curve(const std::deque<SurpriseMoment>& moments, const Rect& rect, float scale) {

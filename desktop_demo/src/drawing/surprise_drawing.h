@@ -1,7 +1,7 @@
 // How surprising a source is, drawn: where, over its picture; when, as a curve; and the events as text.
 #pragma once
 
-#include <app/live_prediction.h>
+#include <app/prediction/live_prediction.h>
 #include <deque>
 #include <nlohmann/json.hpp>
 

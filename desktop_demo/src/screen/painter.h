@@ -18,10 +18,13 @@ class Painter {
   void set_outfit(const maquette::RgbaImage& outfit);
   void set_body(const maquette::DensePoseMesh& body);
   void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo);
+  // A third picture beside the two of a scene.
+  void set_sample(const maquette::RgbaImage& sample);
 
   void draw_people(View view, const Rect& rect);
   // `slider`: the fraction of the width that shows the photo.
   void draw_scene(const Rect& rect, float slider);
+  void draw_sample(const Rect& rect);
   // The body from a direction, in radians, with what was seen of it in colour.
   void draw_body(const Rect& rect, float yaw, float pitch);
 
@@ -34,6 +37,7 @@ class Painter {
     kSeenTexture,
     kRenderingTexture,
     kPhotoTexture,
+    kSampleTexture,
     kTextureCount
   };
   void upload(Texture texture, int width_px, int height_px, const uint8_t* rgba);

@@ -1,7 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <app/live_prediction.h>
+#include <app/prediction/live_prediction.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <vector>
@@ -94,7 +95,7 @@ TEST(LivePrediction, SurpriseIsFoundOfEachFrameWhileItIsWanted) {
 TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
   maquette::PredictionChoice choice;
   choice.finds_surprise = true;
-  choice.surprise_bundle = "/nowhere";
+  choice.bundle = "/nowhere";
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=3");
   ASSERT_TRUE(run.until_ended());
@@ -102,6 +103,76 @@ TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
   EXPECT_NE(run.live.status().problem.find("/nowhere"), std::string::npos) << run.live.status().problem;
   EXPECT_EQ(run.seen().size(), 3u);
   EXPECT_TRUE(run.seen().back().surprise.empty());
+}
+
+maquette::PredictionChoice drawing_choice() {
+  maquette::PredictionChoice choice;
+  choice.finds_uncertainty = choice.draws_sample = true;
+  choice.bundle = MAQ_TEST_DATA "/tiny_transformer/bundle";
+  return choice;
+}
+
+TEST(LivePrediction, UncertaintyAndASampleAreThoseOfEachFrameWhereFramesWait) {
+  PredictionRun run(drawing_choice());
+  run.live.open("stub:people?size=320x240&frames=6");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_EQ(run.live.status().problem, "");
+  const auto seen = run.seen();
+  ASSERT_EQ(seen.size(), 6u);
+  for (const auto& frame : seen) {
+    EXPECT_EQ(frame.drawn.number, frame.number);
+    EXPECT_EQ(frame.drawn_age_ms, 0);
+    EXPECT_EQ(frame.drawn.ahead_s, 0.2);
+    EXPECT_EQ(frame.drawn.bits.size(), 256u);
+    EXPECT_EQ(frame.drawn.picture.width_px, 256);
+    EXPECT_EQ(frame.drawn.picture.height_px, 192);
+  }
+  const auto most = [](const std::vector<float>& bits) { return *std::max_element(bits.begin(), bits.end()); };
+  EXPECT_EQ(most(seen[0].drawn.bits), 0) << "of one frame, no motion is known";
+  EXPECT_GT(most(seen[5].drawn.bits), 0.1f);
+  EXPECT_GT(difference(seen[4].drawn.picture, seen[5].drawn.picture), 0);
+
+  maquette::PredictionChoice choice = drawing_choice();
+  choice.draws_sample = false;
+  run.live.set_choice(choice);
+  ASSERT_TRUE(wait_until([&] { return run.seen().back().drawn.picture.empty(); }));
+  EXPECT_EQ(run.seen().back().drawn.bits, seen[5].drawn.bits);
+  EXPECT_EQ(run.seen().back().number, 6u) << "the same frame";
+}
+
+TEST(LivePrediction, WhatIsDrawnBesideALiveStreamSaysHowOldItIs) {
+  PredictionRun run(drawing_choice(), true);
+  run.live.open("stub:people?size=160x120&fps=30");
+  ASSERT_TRUE(wait_until([&] { return !run.seen().empty() && run.seen().back().drawn.number >= 3; }));
+  double oldest_ms = 0;
+  for (const auto& frame : run.seen()) {
+    if (frame.drawn.number > 0) oldest_ms = std::max(oldest_ms, frame.drawn_age_ms);
+    EXPECT_GE(frame.drawn_age_ms, 0);
+  }
+  EXPECT_GT(oldest_ms, 30) << "no frame waits for it";
+  run.live.set_paused(true);
+  maquette::PredictionChoice choice = drawing_choice();
+  choice.ahead_s = 0.35;
+  run.live.set_choice(choice);
+  ASSERT_TRUE(wait_until([&] { return run.seen().back().drawn.ahead_s == 0.35; })) << "also while it is paused";
+  EXPECT_LT(run.seen().back().drawn_age_ms, 70) << "of the latest frame, or one of those left out after it";
+  choice.finds_uncertainty = choice.draws_sample = false;
+  run.live.set_choice(choice);
+  run.live.set_paused(false);
+  ASSERT_TRUE(wait_until([&] { return run.seen().back().drawn.number == 0; }));
+}
+
+TEST(LivePrediction, WithoutNetworksThatDrawThePictureGoesOn) {
+  maquette::PredictionChoice choice = drawing_choice();
+  choice.bundle = MAQ_TEST_DATA "/tiny_prediction/bundle";
+  PredictionRun run(choice);
+  run.live.open("stub:people?size=160x120&frames=3");
+  ASSERT_TRUE(run.until_ended());
+  EXPECT_FALSE(run.live.status().has_failed);
+  EXPECT_NE(run.live.status().problem.find("tiny-prediction has no networks"), std::string::npos)
+      << run.live.status().problem;
+  EXPECT_EQ(run.seen().size(), 3u);
+  EXPECT_EQ(run.seen().back().drawn.number, 0u);
 }
 
 TEST(LivePrediction, AnotherTimeAheadIsSeenAfterTheEndToo) {

@@ -156,6 +156,43 @@ def test_surprise_is_switched_by_a_key_and_the_picture_goes_on_without_its_netwo
     assert "manifest.json" in ran.stdout
 
 
+def test_what_is_uncertain_is_red_over_what_comes_and_says_how_old_it_is(tmp_path):
+    drawn = show(tmp_path, "--next", "--uncertainty", "--sample", PEOPLE, "--ahead", 100, "--frames", 6)
+    assert drawn.report["problem"] == ""
+    assert drawn.report["drawn"]["number"] == 6
+    assert drawn.report["drawn"]["age_ms"] == 0
+    assert drawn.report["drawn"]["bits"] > 0.2
+    red = redness(inside(drawn.rectangle("next_px")))
+    assert np.percentile(red, 99) > 80
+    assert np.median(red) < 40
+    assert has_border(drawn.rectangle("sample_px"))
+    assert inside(drawn.rectangle("sample_px")).std() > 10
+    off = show(tmp_path, "--next", PEOPLE, "--ahead", 100, "--frames", 6)
+    assert np.percentile(redness(inside(off.rectangle("next_px"))), 99) < 80
+    assert off.report["drawn"] == {"number": 0}
+    without = headless("--next", "--uncertainty", "--prediction-bundle", ROOT / "tests", PEOPLE, "--frames", 3)
+    assert without.returncode == 0, without.stderr
+    assert "manifest.json" in without.stdout
+
+
+def test_uncertainty_and_a_sample_are_switched_by_keys():
+    bundle = ROOT / "tests/native/data/tiny_transformer/bundle"
+    with demo("--next", "--prediction-bundle", bundle, PEOPLE) as hands:
+
+        def magenta_px():
+            """Of lines about what is made up, and of what they say."""
+            return int(is_magenta(hands.see()[:, :940]).sum())
+
+        hands.until(lambda: magenta_px() > 1000, "what comes")
+        one = magenta_px()
+        hands.press("u")
+        hands.until(lambda: magenta_px() > 1.2 * one, "how old the uncertainty is")
+        hands.press("u")
+        hands.until(lambda: magenta_px() < 1.1 * one, "what comes alone")
+        hands.press("d")
+        hands.until(lambda: magenta_px() > 1.3 * one, "a third picture")
+
+
 def test_f7_goes_from_people_to_what_comes_and_back_with_the_same_source():
     with demo(PEOPLE, "--view", "camera", "--no-mesh") as hands:
 

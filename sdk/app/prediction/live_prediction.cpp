@@ -1,4 +1,4 @@
-#include "app/live_prediction.h"
+#include "app/prediction/live_prediction.h"
 
 #include <algorithm>
 #include <new>
@@ -103,9 +103,10 @@ void LivePrediction::run() {
         apply(wanted);
         if (!wanted.is_paused && !status().has_ended) {
           play_frame(wanted);
-        } else if (has_pushed_ && frame_.ahead_s != wanted.choice.ahead_s) {
-          predict(wanted.choice.ahead_s);
-          on_frame_(frame_);
+        } else if (has_pushed_) {
+          const bool is_elsewhen = frame_.ahead_s != wanted.choice.ahead_s;
+          if (is_elsewhen) predict(wanted.choice.ahead_s);
+          if (take_draw() || is_elsewhen) on_frame_(frame_);
         }
       }
     } catch (const std::bad_alloc&) {
@@ -119,7 +120,8 @@ void LivePrediction::run() {
 
 void LivePrediction::close_source() {
   recorder_.reset(), recording_.clear();
-  concealer_.reset(), predictor_.reset(), surprise_.reset(), source_.reset();
+  concealer_.reset(), predictor_.reset(), surprise_.reset(), source_.reset(), draws_.reset();
+  frame_.drawn = {};
   is_surprise_switched_ = false;
   frame_.surprise.clear(), frame_.surprise_bits.clear();
   has_pushed_ = false;
@@ -191,6 +193,41 @@ void LivePrediction::apply(const Wanted& wanted) {
   if (bridges && !concealer_) concealer_.emplace(context_, *source_);
   if (!bridges) concealer_.reset();
   if (is_surprise_switched_ != choice.finds_surprise) switch_surprise(choice);
+  switch_draws(choice);
+}
+
+// They begin with the frames that come from then on.
+void LivePrediction::switch_draws(const PredictionChoice& choice) {
+  const DrawChoice drawing = {choice.ahead_s, choice.draws_sample};
+  if (!choice.finds_uncertainty && !choice.draws_sample) {
+    draws_.reset();
+    frame_.drawn = {};
+  } else if (draws_) {
+    draws_->set_choice(drawing);
+  } else {
+    has_draw_problem_ = false;
+    draws_.emplace(context_, choice.bundle, drawing, options_.real_time, [this] {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_changed_ = true;
+      wake_.notify_one();
+    });
+  }
+}
+
+// Where there is a newer one. Without its networks the picture goes on.
+bool LivePrediction::take_draw() {
+  if (!draws_) return false;
+  const std::string problem = draws_->problem();
+  if (!problem.empty() && !std::exchange(has_draw_problem_, true)) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      status_.problem = problem;
+    }
+    if (on_change_) on_change_();
+  }
+  const bool is_newer = draws_->take(frame_.drawn);
+  if (frame_.drawn.number > 0) frame_.drawn_age_ms = double(shown_ns_ - frame_.drawn.timestamp_ns) / 1e6;
+  return is_newer;
 }
 
 // Without its network the picture goes on.
@@ -200,7 +237,7 @@ void LivePrediction::switch_surprise(const PredictionChoice& choice) {
   frame_.surprise.clear(), frame_.surprise_bits.clear();
   if (!choice.finds_surprise) return;
   maq_surprise_config config = default_surprise_config();
-  if (!choice.surprise_bundle.empty()) config.bundle_path = choice.surprise_bundle.c_str();
+  if (!choice.bundle.empty()) config.bundle_path = choice.bundle.c_str();
   config.allow_spinning = 0;
   try {
     surprise_.emplace(context_, config);
@@ -253,6 +290,10 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
     });
     predictor_->push(frame);
     if (surprise_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) find_surprise(frame);
+    if (draws_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) {
+      draws_->push(frame);
+      if (!options_.real_time) draws_->wait();
+    }
     pushed_ns_ = shown_ns_;
     has_pushed_ = true;
   }
@@ -260,6 +301,7 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
   frame_.bridges_gaps = concealer_.has_value();
   frame_.gaps = concealer_ ? concealer_->stats() : maq_concealer_stats{};
   predict(wanted.choice.ahead_s);
+  take_draw();
   const Clock::time_point now = Clock::now();
   times_.push_back(now);
   while (now - times_.front() > kSecond) times_.pop_front();

@@ -1,6 +1,6 @@
 // A source, what it will show next and how surprising what it shows is (maquette/prediction.h), on a thread of its own,
 // for programs with a window; short gaps of a camera are bridged on request (maquette/concealer.h), which a pipeline
-// does not do.
+// does not do, and how uncertain what comes is is found beside (live_draws.h).
 //
 //   maquette::LivePrediction live(context, {}, [&](const maquette::PredictionFrame& frame) { … });
 //   live.open("stub:people?stall=300ms@3s");
@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "app/live_pipeline.h"
+#include "app/prediction/live_draws.h"
 #include "app/rgba_image.h"
 
 namespace maquette {
@@ -28,7 +29,8 @@ struct PredictionChoice {
   maq_prediction_method method = MAQ_PREDICTION_AUTO;
   bool bridges_gaps = false;  // of a source that plays in real time; others have none
   bool finds_surprise = false;
-  std::string surprise_bundle;  // folder of its network; "": the one installed with the library
+  bool finds_uncertainty = false, draws_sample = false;  // of next; the second: a picture that may come, drawn
+  std::string bundle;  // folder of the networks for these; "": the one installed with the library
 };
 
 struct SurpriseMoment {
@@ -47,6 +49,8 @@ struct PredictionFrame {
   std::deque<SurpriseMoment> surprise;  // of the latest captured frames, at most 300; empty where it is not wanted
   std::vector<float> surprise_bits;     // of the last of them, score.rows rows of score.columns cells
   double surprise_ms = 0;               // that it took
+  DrawnFuture drawn;                    // the latest, of an earlier frame mostly; number 0: none, or not wanted
+  double drawn_age_ms = 0;              // of that frame when `now` was shown
   double waiting_ms = 0, results_per_second = 0;
   uint64_t number = 0;  // 0: none yet
 };
@@ -84,6 +88,8 @@ class LivePrediction final : public LivePlayer {
   void record(const std::function<void()>& step);
   void switch_surprise(const PredictionChoice& choice);
   void find_surprise(const Frame& frame);
+  void switch_draws(const PredictionChoice& choice);
+  bool take_draw();
   void play_frame(const Wanted& wanted);
   void show(Frame frame, const Wanted& wanted);
   void predict(double ahead_s);
@@ -113,7 +119,9 @@ class LivePrediction final : public LivePlayer {
   std::string recording_;
   std::optional<Surprise> surprise_;
   bool is_surprise_switched_ = false;  // on; without surprise_ it could not be made
-  int64_t first_ns_ = 0;               // timestamp of the first frame whose surprise was found
+  std::optional<LiveDraws> draws_;
+  bool has_draw_problem_ = false;  // it was told
+  int64_t first_ns_ = 0;           // timestamp of the first frame whose surprise was found
   PredictionFrame frame_;
   int64_t pushed_ns_ = 0, shown_ns_ = 0;  // timestamps of the latest captured frame, and of `now`
   bool has_pushed_ = false;

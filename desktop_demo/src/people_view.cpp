@@ -188,4 +188,5 @@ void PeopleView::draw_model_options() {
   }
   changed |= ImGui::CheckboxFlags("threads stay awake", &model_.allow_spinning, 1);
   if (changed) live_.set_model(model_);
+  if (ImGui::SliderAngle("camera's roll", &roll_rad_, -180, 180)) live_.set_roll(roll_rad_);
 }

@@ -36,6 +36,7 @@ class PeopleView final : public LiveView {
   void draw_model_options();
 
   maq_densepose_config model_;
+  float roll_rad_ = 0;
   View view_;
   bool shows_mesh_, has_surface_ = false;
   float yaw_ = 0.5f, pitch_ = 0.15f;  // of the body

@@ -6,7 +6,8 @@ A backend is written `kind` or `kind=path`:
     onnx=BUNDLE        the exported graphs, run by ONNX Runtime with the Python reference of decoding
     capi=BUNDLE        what an app gets: libmaquette through its C API
 
-Fields of maq_densepose_config may follow capi: `capi?person_crops=1&long_side_px=384`.
+Fields of maq_densepose_config may follow capi, and what maq_densepose_set_roll is told, in degrees:
+`capi?person_crops=1&long_side_px=384&roll_deg=30`.
 """
 
 from __future__ import annotations
@@ -133,9 +134,12 @@ class CApiBackend:
         self.path = path
         self.precision = manifest["precision"]
         self.threshold = manifest["box_head"]["score_threshold"]
-        self._densepose = DensePose(path, score_threshold=score_floor, **settings)
         if settings:  # tables name columns by the kind
             self.kind = "capi?" + "&".join(f"{name}={value}" for name, value in settings.items())
+        roll_deg = settings.pop("roll_deg", 0)
+        self._densepose = DensePose(path, score_threshold=score_floor, **settings)
+        if roll_deg:
+            self._densepose.set_roll(np.radians(roll_deg))
 
     def predict(self, image: np.ndarray) -> Prediction:
         return prediction_of(self._densepose.run(image))

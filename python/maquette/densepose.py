@@ -83,6 +83,11 @@ class DensePose(NativeObject):
         n.ffi.release(result)
         return DensePoseResult(people, *planes, stats)
 
+    def set_roll(self, roll_rad: float) -> None:
+        """The next images show the world rotated clockwise by this many radians (-7 to 7), as of a camera that is held
+        askew: the networks see them rotated upright. Raises MaquetteError."""
+        native().call("maq_densepose_set_roll", self.handle, roll_rad)
+
     def reset(self) -> None:
         """The next image starts a new stream; needed only with key_frame_interval above 1."""
         native().call("maq_densepose_reset", self.handle)

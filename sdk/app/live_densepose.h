@@ -24,6 +24,7 @@ class LiveDensePose : public LivePipeline {
 
   // Loads the model with other options; a photo is mapped again. Returns at once.
   void set_model(const maq_densepose_config& config) { pipeline().set_densepose(config); }
+  void set_roll(float roll_rad) { pipeline().set_roll(roll_rad); }
   // Nothing until a model is loaded that has one.
   std::optional<maq_densepose_surface> surface() const { return pipeline().surface(); }
 

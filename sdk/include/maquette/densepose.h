@@ -130,6 +130,14 @@ MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* 
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_cancel(maq_densepose* densepose);
 
+/* Says how the camera is held: the next frames show the world rotated clockwise by `roll_rad`, -7 to 7, so that a
+ * standing person's head is to the upper right of the feet for 0.5. 0 at first. The networks, which know people who
+ * stand or lean a little, see the frames rotated upright, by steps of 15 degrees; results are in pixels of the frame as
+ * ever. The input around a rotated frame is larger, and takes longer: twice as long halfway between upright and
+ * sideways.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_densepose_set_roll(maq_densepose* densepose, float roll_rad);
+
 /* Starts a new stream: the next frame is a key frame. Needed only with key_frame_interval above 1.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_reset(maq_densepose* densepose);

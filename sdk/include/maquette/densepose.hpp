@@ -106,6 +106,9 @@ class DensePose {
   // From any thread: the run that runs, or else the next, throws Error with MAQ_CANCELLED.
   void cancel() { check(maq_densepose_cancel(get())); }
 
+  // From any thread.
+  void set_roll(float roll_rad) { check(maq_densepose_set_roll(get(), roll_rad)); }
+
   void reset() { check(maq_densepose_reset(get())); }
 
   // Nothing when the bundle has none. The points are this object's.

@@ -143,6 +143,10 @@ MAQ_API maq_status maq_pipeline_set_densepose(maq_pipeline* pipeline, const maq_
 MAQ_API maq_status maq_pipeline_set_edges(maq_pipeline* pipeline, const maq_edges_config* config,
                                           const maq_edges_curves_config* curves);
 
+/* maq_densepose_set_roll for the next frames of dense pose, whatever the source and the model; edges don't need it.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+MAQ_API maq_status maq_pipeline_set_roll(maq_pipeline* pipeline, float roll_rad);
+
 /* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
  * open.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

@@ -55,6 +55,7 @@ class Pipeline {
   void set_edges(const maq_edges_config& config, const maq_edges_curves_config* curves = nullptr) {
     check(maq_pipeline_set_edges(get(), &config, curves));
   }
+  void set_roll(float roll_rad) { check(maq_pipeline_set_roll(get(), roll_rad)); }
   void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0)); }
   // "" ends the recording.
   void set_recording(const std::string& path) {

@@ -84,6 +84,11 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   return settings;
 }
 
+float require_roll(float roll_rad) {
+  require_range("roll_rad", roll_rad, -7.0f, 7.0f);
+  return roll_rad;
+}
+
 }  // namespace maq
 
 const char* maq_densepose_get_part_name(int32_t part) {
@@ -133,6 +138,14 @@ maq_status maq_densepose_cancel(maq_densepose* densepose) {
   return guarded(densepose, __func__, [&] {
     require_argument(densepose, "densepose");
     densepose->densepose->cancel();
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_densepose_set_roll(maq_densepose* densepose, float roll_rad) {
+  return guarded(densepose, __func__, [&] {
+    require_argument(densepose, "densepose");
+    densepose->densepose->set_roll(require_roll(roll_rad));
     return MAQ_OK;
   });
 }

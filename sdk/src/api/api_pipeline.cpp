@@ -204,6 +204,14 @@ maq_status maq_pipeline_set_edges(maq_pipeline* pipeline, const maq_edges_config
   });
 }
 
+maq_status maq_pipeline_set_roll(maq_pipeline* pipeline, float roll_rad) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    pipeline->pipeline.set_roll(require_roll(roll_rad));
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused) {
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");

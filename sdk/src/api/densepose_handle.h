@@ -15,6 +15,9 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
 // Throws ArgumentError for what is out of range; `name` is that of the config.
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name);
 
+// Throws ArgumentError unless it is one.
+float require_roll(float roll_rad);
+
 }  // namespace maq
 
 struct maq_densepose_result : maq::HandleOf<maq::HandleKind::kDensePoseResult> {

@@ -21,6 +21,7 @@ constexpr char kEvidence[] = "person";  // output of the trunk
 constexpr float kSmallPersonPx = 150;
 constexpr double kMinLeanDegrees = 15;
 constexpr int kCropSidePx = 192;
+constexpr double kFullCircle_rad = 2 * 3.14159265358979323846;
 constexpr size_t kSizedTrunks = 2;  // kept: of frames and of crops
 // In crops people are followed who move by less than this, of their long side, from frame to frame; and who keep this
 // fraction of their pixels.
@@ -102,6 +103,11 @@ DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec
 }
 
 Box scaled(const Box& box, float x, float y) { return {box.x0 * x, box.y0 * y, box.x1 * x, box.y1 * y}; }
+
+// Half-way between the box head's box and the bounds of the body: nearer the true box than either.
+Box between(const Box& a, const Box& b) {
+  return {(a.x0 + b.x0) / 2, (a.y0 + b.y0) / 2, (a.x1 + b.x1) / 2, (a.y1 + b.y1) / 2};
+}
 
 // Stable for every finite logit.
 float logistic(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
@@ -212,17 +218,20 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   result.people.clear();
   result.planes.reset(image.width_px, image.height_px);
 
-  const bool is_same_stream = image.width_px == image_width_px_ && image.height_px == image_height_px_;
+  const double roll_rad = std::remainder(double(roll_rad_.load()), kFullCircle_rad);
+  const int roll_steps = int(std::lround(roll_rad / kRollStepRad));
+  const bool is_same_stream =
+      image.width_px == image_width_px_ && image.height_px == image_height_px_ && roll_steps == seen_.roll_steps;
   image_width_px_ = image.width_px;
   image_height_px_ = image.height_px;
   stats.key_frame = !is_same_stream || frames_since_key_ == 0;
   frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
-  const NetworkSize size = network_size(image.width_px, image.height_px, settings_.long_side_px);
+  seen_ = input_of(image, roll_steps);
   stats.threads = settings_.threads;
   stats.is_threads_measured = measures_threads_;
-  stats.network_width_px = size.width_px;
-  stats.network_height_px = size.height_px;
+  stats.network_width_px = seen_.size.width_px;
+  stats.network_height_px = seen_.size.height_px;
 
   mapped_.clear();
   if (!stats.key_frame && tracks_crops_) {
@@ -238,19 +247,53 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   stats.total_ms = float(total.lap_ms());
 }
 
+DensePose::ImageInput DensePose::input_of(const ImageView& image, int roll_steps) const {
+  ImageInput input;
+  input.roll_steps = roll_steps;
+  input.size = network_size(image.width_px, image.height_px, settings_.long_side_px);
+  input.to_image.xx = double(image.width_px) / input.size.width_px;
+  input.to_image.yy = double(image.height_px) / input.size.height_px;
+  if (roll_steps == 0) return input;
+  // Around the whole image, at the scale of one that is not rotated.
+  const double angle = roll_steps * kRollStepRad;
+  const double cos = std::cos(angle), sin = std::sin(angle);
+  const double scale = settings_.long_side_px / double(std::max(image.width_px, image.height_px));
+  const auto side = [&](double along, double across) {
+    return std::max(1, int(std::ceil(scale * (along * std::abs(cos) + across * std::abs(sin)) - 1e-6)));
+  };
+  input.size = {side(image.width_px, image.height_px), side(image.height_px, image.width_px)};
+  AffineMap& map = input.to_image;
+  map.xx = map.yy = cos / scale;
+  map.xy = -sin / scale;
+  map.yx = sin / scale;
+  const double middle_x = input.size.width_px / 2.0, middle_y = input.size.height_px / 2.0;
+  map.shift_x = image.width_px / 2.0 - map.xx * middle_x - map.xy * middle_y;
+  map.shift_y = image.height_px / 2.0 - map.yx * middle_x - map.yy * middle_y;
+  input.up = {sin, -cos};
+  return input;
+}
+
 void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {
   Stopwatch stage;
   TraceSection trace("maquette resize");
-  make_network_input(image, {stats.network_width_px, stats.network_height_px}, spec_.input, input_);
+  const NetworkSize padded{round_up(seen_.size.width_px, spec_.input.multiple_of),
+                           round_up(seen_.size.height_px, spec_.input.multiple_of)};
+  const bool is_rotated = seen_.roll_steps != 0;
+  if (is_rotated) {
+    make_crop_input(image, seen_.to_image, padded, spec_.input, crop_input_);
+  } else {
+    make_network_input(image, seen_.size, spec_.input, input_);
+  }
   stats.preprocess_ms = float(stage.lap_ms());
 
   trace.next("maquette detector");
-  stats.provider = run_trunk(whole_, input_.values, input_.padded_width_px, input_.padded_height_px);
+  const std::vector<float>& values = is_rotated ? crop_input_.values : input_.values;
+  stats.provider = run_trunk(whole_, values, padded.width_px, padded.height_px);
   stats.trunk_ms = float(stage.lap_ms());
 
   trace.next("maquette boxes");
   if (stats.key_frame) {
-    propose(image.height_px, proposals_, &stats.dropped_boxes);
+    propose(proposals_, &stats.dropped_boxes);
   } else {
     proposals_.clear();
     for (const MappedPerson& person : tracked_) proposals_.push_back(person.found);
@@ -322,7 +365,7 @@ maq_provider DensePose::run_trunk(const Mapper& mapper, const std::vector<float>
   return trunk.provider();
 }
 
-void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped) {
+void DensePose::propose(std::vector<ScoredBox>& found, int* dropped) {
   rpn_levels_.assign(kRpnLevels, {});
   // Runs a graph of the RPN on `count` levels from `first` on.
   const auto run_rpn = [&](Session& rpn, size_t first, size_t count) {
@@ -338,11 +381,11 @@ void DensePose::propose(int image_height_px, std::vector<ScoredBox>& found, int*
   run_rpn(*rpn_coarse_, 1, kRpnLevels - 1);
   // The finest anchors are for boxes smaller than the geometric mean of their side and the next level's. A standing
   // person is about three times as high as wide, so that the box's side (root of its area) is height / sqrt(3).
-  const float scale = float(input_.height_px) / float(image_height_px);
+  const float scale = float(1 / std::hypot(seen_.to_image.xy, seen_.to_image.yy));
   const std::vector<float>& sizes = spec_.rpn.anchor_sizes_px;
   if (float(settings_.min_person_height_px) * scale < std::sqrt(3.0f * sizes[0] * sizes[1])) run_rpn(*rpn_fine_, 0, 1);
-  select_proposals(rpn_levels_, spec_.rpn, settings_.max_proposals, float(input_.width_px), float(input_.height_px),
-                   candidates_, found, dropped);
+  select_proposals(rpn_levels_, spec_.rpn, settings_.max_proposals, float(seen_.size.width_px),
+                   float(seen_.size.height_px), candidates_, found, dropped);
 }
 
 // The larger the box, the coarser the level (Lin et al., Feature Pyramid Networks, 2017, equation 1).
@@ -381,7 +424,7 @@ void DensePose::run_box_head(const std::vector<ScoredBox>& boxes, float min_scor
     const float* logits = outputs.data + 6 * i;
     const float score = logistic(logits[0] - logits[1] + evidence_in(boxes[i].box));
     Box box = apply_deltas(boxes[i].box, outputs.data + 6 * i + 2, spec.delta_weights);
-    if (std::isnan(score) || !clip_box(box, float(input_.width_px), float(input_.height_px))) {
+    if (std::isnan(score) || !clip_box(box, float(seen_.size.width_px), float(seen_.size.height_px))) {
       ++*dropped;
     } else if (score > min_score) {
       found.push_back({box, score, int64_t(i)});
@@ -394,15 +437,17 @@ void DensePose::map_people(const ImageView& image, const DensePlanes& planes, De
   Stopwatch stage;
   TraceSection trace("maquette dense head");
   const DenseHeadSpec& spec = spec_.dense_head;
-  const float scale_x = float(planes.width_px) / float(input_.width_px);
-  const float scale_y = float(planes.height_px) / float(input_.height_px);
   rois_.resize(found_.size() * dense_roi_size());
   for (const ScoredBox& person : found_) {
     roi_align_.run(features_[0], person.box, spec.pool_size, rois_.data() + mapped_.size() * dense_roi_size());
     MappedPerson mapped;
     mapped.found = person;
-    mapped.box = scaled(person.box, scale_x, scale_y);
-    clip_box(mapped.box, float(planes.width_px), float(planes.height_px));
+    if (seen_.roll_steps == 0) {
+      mapped.box = scaled(person.box, float(seen_.to_image.xx), float(seen_.to_image.yy));
+      clip_box(mapped.box, float(planes.width_px), float(planes.height_px));
+    } else {  // the box comes from what is painted: around this one's corners it would be too large
+      mapped.first_view = PersonCrop{seen_.to_image, seen_.to_image.inverse(), person.box, true};
+    }
     mapped_.push_back(mapped);
   }
   const std::vector<TensorView>& answers = run_dense_head(whole_, found_.size());
@@ -454,12 +499,13 @@ void DensePose::choose_crops() {
     const DenseLogits logits = logits_of(person);
     classify_cells(logits, decode_memory_);
     person.confidence = part_confidence(logits, threshold, decode_memory_);
-    const AffineMap cells = map_of_cells(person.box, logits.size);
+    const AffineMap cells =
+        person.first_view ? person.first_view->to_cells(logits.size).inverse() : map_of_cells(person.box, logits.size);
     const auto axis = find_body_axis(logits, cells, threshold, decode_memory_);
-    const PersonCrop crop =
-        crop_around_person(logits.size, cells, axis, threshold, 0, settings_.crop_side_px, decode_memory_);
+    const PersonCrop crop = crop_around_person(logits.size, cells, axis.value_or(seen_.up), threshold, 0,
+                                               settings_.crop_side_px, decode_memory_);
     const bool is_small = std::max(person.found.box.width(), person.found.box.height()) < kSmallPersonPx;
-    if (settings_.crops == PersonCrops::kAll || leans(axis, kMinLeanDegrees) || is_small) person.crop = crop;
+    if (settings_.crops == PersonCrops::kAll || leans(axis, kMinLeanDegrees, seen_.up) || is_small) person.crop = crop;
   }
 }
 
@@ -485,7 +531,7 @@ void DensePose::run_crops(const ImageView& image, DensePoseStats& stats) {
       person.surface = surface;
     }
     if (!person.crop) continue;
-    make_crop_input(image, person.crop->to_image, side, spec_.input, crop_input_);
+    make_crop_input(image, person.crop->to_image, {side, side}, spec_.input, crop_input_);
     stats.provider = run_trunk(crops_, crop_input_.values, side, side);
     roi_align_.run(features_[0], person.crop->box, spec_.dense_head.pool_size, roi);
     roi += dense_roi_size();
@@ -525,15 +571,22 @@ void DensePose::paint_people(DensePoseResult& result) {
     DenseLogits logits = logits_of(person);
     if (!settings_.surface) logits.charts = nullptr;
     const uint8_t number = uint8_t(result.people.size() + 1);
+    const PersonCrop* const place = person.crop ? &*person.crop : person.first_view ? &*person.first_view : nullptr;
     const DecodeCounts counts =
-        person.crop ? paint_rotated_person(logits, person.crop->to_cells(logits.size), number, spec.mask_threshold,
-                                           spec.min_visible_fraction, decode_memory_, result.planes)
-                    : paint_person(logits, person.box, number, spec.mask_threshold, spec.min_visible_fraction,
-                                   decode_memory_, result.planes);
+        place != nullptr ? paint_rotated_person(logits, place->to_cells(logits.size), number, spec.mask_threshold,
+                                                spec.min_visible_fraction, decode_memory_, result.planes)
+                         : paint_person(logits, person.box, number, spec.mask_threshold, spec.min_visible_fraction,
+                                        decode_memory_, result.planes);
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
     // A box without a body is a false alarm; one whose body is painted already shows the same person again.
     if (counts.body_pixels == 0) continue;
+    if (place != nullptr) {
+      Box body =
+          person_bounds(logits.size, place->to_cells(logits.size).inverse(), spec.mask_threshold, decode_memory_);
+      clip_box(body, float(result.planes.width_px), float(result.planes.height_px));
+      person.box = person.first_view ? body : between(person.box, body);
+    }
     const bool is_lost = double(counts.body_pixels) < kMinKeptBody * double(person.body_pixels);
     person.body_pixels = counts.body_pixels;
     if (tracks_crops_) follow_in_crop(person, result);
@@ -557,8 +610,8 @@ void DensePose::follow_in_crop(MappedPerson& person, const DensePoseResult& resu
     if (clip_box(bounds, float(result.planes.width_px), float(result.planes.height_px))) person.box = bounds;
   }
   const auto axis = find_body_axis(logits, cells, threshold, decode_memory_);
-  person.crop =
-      crop_around_person(logits.size, cells, axis, threshold, kMotionMargin, settings_.crop_side_px, decode_memory_);
+  person.crop = crop_around_person(logits.size, cells, axis.value_or(seen_.up), threshold, kMotionMargin,
+                                   settings_.crop_side_px, decode_memory_);
 }
 
 }  // namespace maq

@@ -1,6 +1,7 @@
 // Dense pose of one image: detector, box head, dense head and the decode between and after them.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -22,6 +23,9 @@
 #include "nn/sized_sessions.h"
 
 namespace maq {
+
+// Networks lose little by half of it; smaller steps would begin key frames more often.
+constexpr double kRollStepRad = 15 * 3.14159265358979323846 / 180;
 
 enum class PersonCrops { kOff, kAuto, kAll };  // as maq_person_crops
 
@@ -99,6 +103,10 @@ class DensePose {
   // anew, unless another provider than the CPU runs them.
   void set_effort(int key_frame_interval, int long_side_px);
 
+  // From any thread: the pictures of the next runs show the world rotated clockwise by `rad`, -7 to 7. The
+  // networks see them rotated upright, by steps of kRollStepRad; where the step changes, a key frame begins.
+  void set_roll(float rad) noexcept { roll_rad_ = rad; }
+
   // Where on the body labels lie; from any thread, also during run(). Throws what BodySurface::grid() throws.
   const SurfaceGrid& surface() { return surface_.grid(); }
 
@@ -108,12 +116,21 @@ class DensePose {
     ScoredBox found;  // in pixels of the network's input
     Box box;          // in pixels of the image
     Box beyond_body;  // from the bounds of the painted body to `box`, side by side, when the box head saw it
+    std::optional<PersonCrop> first_view;  // where the first answer lies, of an image that was rotated
     std::optional<PersonCrop> crop;
     float confidence = 0;           // of the answer from the whole image
     int64_t body_pixels = 0;        // when last painted
     const float* labels = nullptr;  // a dense head's answer, of the crop where there is one
     const float* surface = nullptr;
     ChartPredictor* charts = nullptr;  // of that dense head
+  };
+
+  // How the networks see the image.
+  struct ImageInput {
+    NetworkSize size;    // without padding
+    AffineMap to_image;  // from pixels of the input
+    int roll_steps = 0;  // of kRollStepRad, by which the image was rotated
+    Point up{0, -1};     // in the image, a unit vector
   };
 
   // What maps the surface, of whole images or of crops.
@@ -126,6 +143,7 @@ class DensePose {
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
+  ImageInput input_of(const ImageView& image, int roll_steps) const;
   // Of the trunk's outputs for such an input, into `shapes_`; of one that gives all levels the evidence, too.
   void set_level_shapes(int width_px, int height_px, size_t levels);
   // How many threads the trunk, which takes the longest, is fastest on.
@@ -135,7 +153,7 @@ class DensePose {
   // Returns the provider in use.
   maq_provider run_trunk(const Mapper& mapper, const std::vector<float>& values, int width_px, int height_px);
   // The best boxes of the RPN. Its finest level runs only where people of min_person_height_px may be that small.
-  void propose(int image_height_px, std::vector<ScoredBox>& found, int* dropped);
+  void propose(std::vector<ScoredBox>& found, int* dropped);
   // One pass of the box head: scores and refines `boxes`, keeps those of a score above `min_score`, then NMS.
   void run_box_head(const std::vector<ScoredBox>& boxes, float min_score, std::vector<ScoredBox>& found, int* dropped);
   // Finds people in the whole image, at key frames, or follows those of the frame before; into `found_`.
@@ -180,6 +198,8 @@ class DensePose {
   std::optional<ChartPredictor> crop_charts_;
   Mapper whole_, crops_;
   BodySurface surface_;
+  std::atomic<float> roll_rad_{0};
+  ImageInput seen_;  // of the image before, while none is run
   NetworkInput input_;
   std::vector<TensorView> pyramid_;   // P2 to P6, or P2, in memory of a trunk
   std::vector<FeatureMap> features_;  // the same, without P6

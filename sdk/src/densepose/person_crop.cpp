@@ -126,8 +126,8 @@ std::optional<Point> find_body_axis(const DenseLogits& logits, const AffineMap& 
   return unit(sum);
 }
 
-bool leans(const std::optional<Point>& axis, double degrees) {
-  return axis && -axis->y < std::cos(degrees * kPi / 180);
+bool leans(const std::optional<Point>& axis, double degrees, const Point& up) {
+  return axis && axis->x * up.x + axis->y * up.y < std::cos(degrees * kPi / 180);
 }
 
 PersonCrop crop_around_person(int size, const AffineMap& cells_to_image, const std::optional<Point>& axis,

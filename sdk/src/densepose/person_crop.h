@@ -32,8 +32,8 @@ AffineMap map_of_cells(const Box& box, int cells);
 std::optional<Point> find_body_axis(const DenseLogits& logits, const AffineMap& cells_to_image, float mask_threshold,
                                     const DecodeMemory& memory);
 
-// Whether the axis leans from upright by more than that.
-bool leans(const std::optional<Point>& axis, double degrees);
+// Whether the axis leans from `up`, a unit vector, by more than that.
+bool leans(const std::optional<Point>& axis, double degrees, const Point& up = {0, -1});
 
 // The crop of `side_px` pixels around the cells that show the person, around all where none does; rotated upright if
 // `axis` leans by more than kMinRotationDegrees. Its box is `margin` of its long side larger each way. `size`: of the

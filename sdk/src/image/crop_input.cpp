@@ -16,10 +16,10 @@ struct Window {
   int x0, y0, x1, y1;
 };
 
-Window seen_window(const ImageView& image, const AffineMap& to_image, int side_px) {
-  const double side = side_px;
+Window seen_window(const ImageView& image, const AffineMap& to_image, const NetworkSize& crop_size) {
+  const double width = crop_size.width_px, height = crop_size.height_px;
   Point low = to_image({0, 0}), high = low;
-  for (const Point& corner : {to_image({side, 0}), to_image({0, side}), to_image({side, side})}) {
+  for (const Point& corner : {to_image({width, 0}), to_image({0, height}), to_image({width, height})}) {
     low = {std::min(low.x, corner.x), std::min(low.y, corner.y)};
     high = {std::max(high.x, corner.x), std::max(high.y, corner.y)};
   }
@@ -78,11 +78,11 @@ AffineMap AffineMap::inverse() const {
   return back;
 }
 
-void make_crop_input(const ImageView& image, const AffineMap& to_image, int side_px, const NetworkInputSpec& spec,
-                     CropInput& crop) {
-  const size_t plane = size_t(side_px) * size_t(side_px);
+void make_crop_input(const ImageView& image, const AffineMap& to_image, const NetworkSize& crop_size,
+                     const NetworkInputSpec& spec, CropInput& crop) {
+  const size_t plane = size_t(crop_size.width_px) * size_t(crop_size.height_px);
   crop.values.assign(3 * plane, 0);
-  const Window seen = seen_window(image, to_image, side_px);
+  const Window seen = seen_window(image, to_image, crop_size);
   const int width = seen.x1 - seen.x0, height = seen.y1 - seen.y0;
   if (width <= 0 || height <= 0) return;
 
@@ -97,11 +97,11 @@ void make_crop_input(const ImageView& image, const AffineMap& to_image, int side
 
   const double scale_x = double(size.width_px) / width, scale_y = double(size.height_px) / height;
   const Point step{to_image.xx * scale_x, to_image.yx * scale_y};
-  for (int row = 0; row < side_px; ++row) {
+  for (int row = 0; row < crop_size.height_px; ++row) {
     const Point first = to_image({0.5, row + 0.5});
     const Point at{(first.x - seen.x0) * scale_x - 0.5, (first.y - seen.y0) * scale_y - 0.5};
-    read_line(crop.window.values.data(), size.width_px, size.height_px, at, step, side_px,
-              crop.values.data() + size_t(row) * size_t(side_px), plane);
+    read_line(crop.window.values.data(), size.width_px, size.height_px, at, step, crop_size.width_px,
+              crop.values.data() + size_t(row) * size_t(crop_size.width_px), plane);
   }
 }
 

@@ -27,15 +27,15 @@ struct AffineMap {
 };
 
 struct CropInput {
-  std::vector<float> values;  // [3, side, side]: R, G, B, normalised; zero beyond the image
+  std::vector<float> values;  // [3, height, width]: R, G, B, normalised; zero beyond the image
 
   // Scratch, kept from crop to crop.
   NetworkInput window;
 };
 
-// The square of `side_px` pixels that `to_image`, a rotation and a scaling, takes to its place in `image`. Bilinear;
-// where the crop is much coarser than the image, of pixels averaged before.
-void make_crop_input(const ImageView& image, const AffineMap& to_image, int side_px, const NetworkInputSpec& spec,
-                     CropInput& crop);
+// The rectangle of `crop_size` pixels that `to_image`, a rotation and a scaling, takes to its place in `image`.
+// Bilinear; where the crop is much coarser than the image, of pixels averaged before.
+void make_crop_input(const ImageView& image, const AffineMap& to_image, const NetworkSize& crop_size,
+                     const NetworkInputSpec& spec, CropInput& crop);
 
 }  // namespace maq

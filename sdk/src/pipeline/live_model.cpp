@@ -15,6 +15,7 @@ class LiveDensePose : public LiveModel {
     densepose_.run(frame.image, output.densepose);
     output.is_edges = output.has_curves = false;
   }
+  void set_roll(float rad) override { densepose_.set_roll(rad); }
   void cancel() noexcept override { densepose_.cancel(); }
   void forget() override { densepose_.reset(); }
   int threads() const override { return densepose_.threads(); }

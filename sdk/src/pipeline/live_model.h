@@ -40,9 +40,10 @@ class LiveModel {
 
   // `camera`: of the source, nullptr where it does not say. Memory of `output` is reused.
   virtual void run(const Frame& frame, const maq_intrinsics* camera, PipelineOutput& output) = 0;
-  virtual void cancel() noexcept = 0;  // from any thread
-  virtual void forget() {}             // the source before
-  virtual int threads() const = 0;     // in use
+  virtual void set_roll(float /*rad*/) {}  // of the next frames' pictures
+  virtual void cancel() noexcept = 0;      // from any thread
+  virtual void forget() {}                 // the source before
+  virtual int threads() const = 0;         // in use
   // What it does for a frame; of a model that cannot do less, 0 and 0.
   virtual FrameEffort effort() const { return {0, 0}; }
   virtual void set_effort(const FrameEffort&) {}

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
@@ -112,6 +113,8 @@ struct Pipeline::State {
   PipelineStats counts;
   std::shared_ptr<LiveModel> model;  // none before the first is loaded; networks are run by the thread alone
   std::list<SurfaceGrid> surfaces;   // that were asked for
+
+  std::atomic<float> roll_rad{0};
 
   // Of the thread alone. Source and model are done when their numbers are those of the request.
   Request now;
@@ -363,6 +366,7 @@ struct Pipeline::State {
     }
     record_frame();
     const auto begin = Clock::now();
+    model->set_roll(roll_rad);
     model->run(frame, source->intrinsics(), output);
     deliver(ms_between(*std::exchange(waiting_since, std::nullopt), begin), begin);
   }
@@ -510,6 +514,8 @@ void Pipeline::set_paused(bool is_paused) {
   state_->is_paused = is_paused;
   state_->note_change();
 }
+
+void Pipeline::set_roll(float rad) { state_->roll_rad = rad; }
 
 void Pipeline::set_recording(const std::string& path) {
   std::lock_guard<std::mutex> lock(state_->mutex);

@@ -63,6 +63,7 @@ class Pipeline {
   void set_source(const std::string& uri);
   void set_model(const PipelineModel& model);
   void set_paused(bool is_paused);
+  void set_roll(float rad);                     // DensePose::set_roll() of this model and later ones
   void set_recording(const std::string& path);  // "": ends it
   // Returns when no callback runs, unless it is called by one.
   void stop();

@@ -22,12 +22,15 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr double kDegree_rad = 3.14159265358979323846 / 180;
+
 struct DensePoseOptions {
   std::vector<std::string> sources;
   ModelOptions model;
   std::string out;
   bool overlay = false;
   bool json = false;
+  double roll_deg = 0;
   FrameLimits limits;
 };
 
@@ -140,6 +143,7 @@ int run_densepose(const DensePoseOptions& options) {
   Timings timings;
   const auto load = [&] {
     densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
+    densepose->set_roll(float(options.roll_deg * kDegree_rad));
   };
   const auto run = [&](const SourceArgument& argument, maquette::Source& source) {
     run_source(options, argument, context, source, *densepose, timings);
@@ -164,6 +168,11 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_model_options(*command, options->model);
+  command
+      ->add_option("--roll", options->roll_deg,
+                   "The pictures show the world rotated clockwise by so many degrees: people are mapped as if it stood "
+                   "upright")
+      ->check(CLI::Range(-360.0, 360.0));
   add_frame_limits(*command, options->limits);
   command->footer(
       "Writes for each image, in the DensePose convention:\n"
@@ -174,6 +183,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"
       "  maquette densepose holiday/*.jpg --out results --size 480\n"
+      "  maquette densepose lying_phone.jpg --out results --roll 90\n"
       "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
       "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");
   command->callback([=] { *exit_code = run_densepose(*options); });

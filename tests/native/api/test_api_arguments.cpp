@@ -60,6 +60,7 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
   expect_error(maq_densepose_create(nullptr, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, nullptr,
                "context is NULL");
   expect_error(maq_densepose_reset(nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
+  expect_error(maq_densepose_set_roll(nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_run(nullptr, nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "densepose is NULL");
   expect_error(maq_densepose_result_get_size(nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");
   expect_error(maq_densepose_result_get_person(nullptr, 0, &person), MAQ_ERROR_INVALID_ARGUMENT, nullptr, "result");

@@ -326,6 +326,76 @@ TEST_F(ShippedNetworks, ABatchOfPeopleIsAnsweredAsOneByOne) {
   }
 }
 
+// The photo rotated clockwise about its middle, on a grey frame around it, and the way back to the photo.
+struct RotatedPhoto {
+  RotatedPhoto(const cv::Mat& photo, double degrees) {
+    const double angle = degrees * CV_PI / 180;
+    const double width = photo.cols * std::abs(std::cos(angle)) + photo.rows * std::abs(std::sin(angle));
+    const double height = photo.cols * std::abs(std::sin(angle)) + photo.rows * std::abs(std::cos(angle));
+    const cv::Size size(int(std::ceil(width - 1e-6)), int(std::ceil(height - 1e-6)));
+    into = cv::getRotationMatrix2D({float(photo.cols - 1) / 2, float(photo.rows - 1) / 2}, -degrees, 1);
+    into.at<double>(0, 2) += (size.width - photo.cols) / 2.0;
+    into.at<double>(1, 2) += (size.height - photo.rows) / 2.0;
+    cv::warpAffine(photo, bgr, into, size, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar::all(116));
+  }
+
+  cv::Mat bgr;
+  cv::Mat into;  // from the photo
+};
+
+// Of the photo's pixels that show a body in either result, those that show the same part in both.
+double same_parts(const maq::DensePoseResult& upright, const maq::DensePoseResult& rotated, const cv::Mat& into) {
+  const auto plane = [](const maq::DensePoseResult& result) {
+    return cv::Mat(result.planes.height_px, result.planes.width_px, CV_8U,
+                   const_cast<uint8_t*>(result.planes.part.data()));
+  };
+  const cv::Mat first = plane(upright);
+  cv::Mat back;
+  cv::warpAffine(plane(rotated), back, into, first.size(), cv::INTER_NEAREST | cv::WARP_INVERSE_MAP);
+  const int same = cv::countNonZero((first == back) & (first != 0));
+  return double(same) / cv::countNonZero((first != 0) | (back != 0));
+}
+
+TEST_F(ShippedNetworks, AFrameOfACameraHeldAskewIsMappedAsIfItStoodUprightOnceTheRollIsTold) {
+  for (const maq::PersonCrops crops : {maq::PersonCrops::kOff, maq::PersonCrops::kAll}) {
+    maq::DensePoseSettings settings;
+    settings.crops = crops;
+    const maq::DensePoseResult upright = run(photo_, settings);
+    ASSERT_EQ(upright.people.size(), 1u);
+    maq::DensePose densepose = make(settings);
+    for (const double degrees : {-30.0, 45.0, 90.0, -90.0, 130.0, 180.0}) {
+      const RotatedPhoto photo(photo_, degrees);
+      maq::DensePoseResult untold, told;
+      densepose.set_roll(0);
+      densepose.run(view_of(photo.bgr), untold);
+      densepose.set_roll(float(degrees * CV_PI / 180));
+      densepose.run(view_of(photo.bgr), told);
+      expect_sane(told, photo.bgr);
+      ASSERT_EQ(told.people.size(), 1u) << degrees;
+      EXPECT_GT(same_parts(upright, told, photo.into), 0.7) << degrees;
+      EXPECT_GT(same_parts(upright, told, photo.into), same_parts(upright, untold, photo.into)) << degrees;
+      EXPECT_NEAR(told.people[0].score, upright.people[0].score, 0.05) << degrees;
+    }
+  }
+}
+
+TEST_F(ShippedNetworks, ARollBeginsAKeyFrameWhereItsStepChanges) {
+  maq::DensePoseSettings settings;
+  settings.key_frame_interval = 100;
+  maq::DensePose densepose = make(settings);
+  const auto is_key_frame = [&](double degrees) {
+    maq::DensePoseResult result;
+    densepose.set_roll(float(degrees * CV_PI / 180));
+    densepose.run(view_of(photo_), result);
+    return result.stats.key_frame;
+  };
+  EXPECT_TRUE(is_key_frame(0));
+  EXPECT_FALSE(is_key_frame(7));
+  EXPECT_TRUE(is_key_frame(8));
+  EXPECT_FALSE(is_key_frame(22));
+  EXPECT_TRUE(is_key_frame(-5));
+}
+
 TEST_F(ShippedNetworks, FramesOfOneColourAndCheckerboardsShowNoPeople) {
   maq::DensePose densepose = make();
   maq::DensePoseResult result;

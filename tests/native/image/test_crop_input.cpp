@@ -32,7 +32,7 @@ AffineMap crop_map(const Point& middle, double degrees, double scale) {
 std::vector<float> cut(const maq::ImageView& image, const AffineMap& to_image) {
   maq::CropInput crop;
   crop.values.assign(7, 1e9f);  // what an earlier crop left
-  make_crop_input(image, to_image, kSide, kCropSpec, crop);
+  make_crop_input(image, to_image, {kSide, kSide}, kCropSpec, crop);
   EXPECT_EQ(crop.values.size(), size_t(3 * kSide * kSide));
   for (size_t i = 0; i < crop.values.size(); ++i) {
     const size_t c = i / (kSide * kSide);
@@ -110,8 +110,8 @@ TEST(CropInput, BesideTheImageIsTheMeanColour) {
   const std::vector<uint8_t> bgr(3 * 8 * 8, 255);
   for (const Point middle : {Point{-100, 4}, Point{4, 1e7}, Point{1e9, -1e9}}) {
     maq::CropInput crop;
-    make_crop_input(maq::packed_view(MAQ_PIXEL_BGR8, 8, 8, bgr.data()), crop_map(middle, 10, 1), kSide, kCropSpec,
-                    crop);
+    make_crop_input(maq::packed_view(MAQ_PIXEL_BGR8, 8, 8, bgr.data()), crop_map(middle, 10, 1), {kSide, kSide},
+                    kCropSpec, crop);
     EXPECT_EQ(std::count(crop.values.begin(), crop.values.end(), 0.0f), 3 * kSide * kSide);
   }
 }

@@ -230,6 +230,24 @@ TEST(Pipeline, PausesAndGoesOn) {
   EXPECT_EQ(watched.sequences(), (std::vector<uint64_t>{0, 1, 2, 3, 4, 5, 6, 7}));
 }
 
+TEST(Pipeline, ARollHoldsForTheNextFramesAndForAnotherModel) {
+  Watched* self = nullptr;
+  std::vector<int> widths;
+  Watched::Options options;
+  options.on_result = [&](const maquette::PipelineResult& result) {
+    widths.push_back(result.densepose.stats().network_width_px);
+    if (result.number == 2) self->pipeline->set_roll(1.57f);
+  };
+  Watched watched(options);
+  self = &watched;
+  watched.pipeline->set_source("stub:pattern?frames=4&size=64x32");
+  ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
+  ASSERT_EQ(widths.size(), 4u);
+  EXPECT_EQ(widths[1], widths[0]);
+  EXPECT_EQ(widths[2], widths[0] / 2) << "the input lies on its side";
+  EXPECT_EQ(widths[3], widths[2]);
+}
+
 TEST(Pipeline, TheCameraIsLostAndComesBack) {
   Watched watched({});
   load_model(watched);
@@ -661,6 +679,10 @@ TEST(Pipeline, RefusesWrongArguments) {
   }());
   EXPECT_EQ(maq_pipeline_set_source(good.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_pipeline_set_paused(good.get(), 2), MAQ_ERROR_INVALID_ARGUMENT);
+  for (const float roll : {7.1f, -8.0f, std::numeric_limits<float>::quiet_NaN()}) {
+    EXPECT_EQ(maq_pipeline_set_roll(good.get(), roll), MAQ_ERROR_INVALID_ARGUMENT) << roll;
+  }
+  EXPECT_EQ(maq_pipeline_set_roll(nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_pipeline_set_recording(good.get(), ""), MAQ_ERROR_INVALID_ARGUMENT);
   maq_pipeline_result result{};
   EXPECT_EQ(maq_pipeline_acquire_result(good.get(), 0, &result), MAQ_ERROR_INVALID_ARGUMENT);

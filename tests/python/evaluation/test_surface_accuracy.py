@@ -354,8 +354,18 @@ def test_unknown_backend_and_missing_model_are_explained(tmp_path):
 
 def test_settings_of_the_sdk_are_part_of_the_backends_name(monkeypatch):
     given = {}
-    monkeypatch.setattr("maquette.DensePose", lambda path, **settings: given.update(settings))
+
+    class Told:
+        def __init__(self, path, **settings):
+            given.update(settings)
+
+        def set_roll(self, roll_rad):
+            given["roll_rad"] = roll_rad
+
+    monkeypatch.setattr("maquette.DensePose", Told)
     backend = open_backend("capi?person_crops=1&long_side_px=384", 0.05)
     assert given == {"score_threshold": 0.05, "person_crops": 1, "long_side_px": 384}
     assert backend.kind == "capi?person_crops=1&long_side_px=384"
+    assert open_backend("capi?roll_deg=-90", 0.05).kind == "capi?roll_deg=-90"
+    assert given["roll_rad"] == pytest.approx(-np.pi / 2)
     assert open_backend("capi", 0.05).kind == "capi"

@@ -28,7 +28,7 @@ TextureCrop texture_crop(const ImageView& photo, const HeadSquare& square, int t
   as_bytes.mean = {kBeyondPhoto, kBeyondPhoto, kBeyondPhoto};
   as_bytes.std = {1, 1, 1};
   CropInput crop;
-  make_crop_input(photo, to_photo, made.side_px, as_bytes, crop);
+  make_crop_input(photo, to_photo, {made.side_px, made.side_px}, as_bytes, crop);
   const size_t pixels = size_t(made.side_px) * size_t(made.side_px);
   made.rgb.resize(3 * pixels);
   for (size_t i = 0; i < pixels; ++i) {

@@ -86,7 +86,7 @@ void HeadEncoder::run(const ImageView& photo, const HeadSquare& square, const Ru
   NetworkInputSpec as_bytes;
   as_bytes.mean = {kGrey, kGrey, kGrey};
   as_bytes.std = {1, 1, 1};
-  make_crop_input(photo, encoding.crop_to_photo, crop_px, as_bytes, crop_);
+  make_crop_input(photo, encoding.crop_to_photo, {crop_px, crop_px}, as_bytes, crop_);
   const size_t pixels = size_t(crop_px) * size_t(crop_px);
   encoding.rgb.resize(3 * pixels);
   for (size_t i = 0; i < pixels; ++i) {

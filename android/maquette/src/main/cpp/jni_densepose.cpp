@@ -35,6 +35,10 @@ MAQ_NATIVE(void, cancelDensePose)(JNIEnv* env, jclass, jlong densepose) {
   call(env, [&] { check(maq_densepose_cancel(object<maq_densepose>(densepose))); });
 }
 
+MAQ_NATIVE(void, setRollOfDensePose)(JNIEnv* env, jclass, jlong densepose, jfloat roll_rad) {
+  call(env, [&] { check(maq_densepose_set_roll(object<maq_densepose>(densepose), roll_rad)); });
+}
+
 MAQ_NATIVE(void, resetDensePose)(JNIEnv* env, jclass, jlong densepose) {
   call(env, [&] { check(maq_densepose_reset(object<maq_densepose>(densepose))); });
 }

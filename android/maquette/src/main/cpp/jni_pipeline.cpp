@@ -60,6 +60,10 @@ MAQ_NATIVE_OF(NativePipeline, void, setDensePose)
   });
 }
 
+MAQ_NATIVE_OF(NativePipeline, void, setRoll)(JNIEnv* env, jclass, jlong pipeline, jfloat roll_rad) {
+  call(env, [&] { check(maq_pipeline_set_roll(pipeline_of(pipeline), roll_rad)); });
+}
+
 MAQ_NATIVE_OF(NativePipeline, void, setPaused)(JNIEnv* env, jclass, jlong pipeline, jboolean is_paused) {
   call(env, [&] { check(maq_pipeline_set_paused(pipeline_of(pipeline), is_paused)); });
 }

@@ -99,6 +99,13 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     /** Ends the [run] that runs, or else the next; from any thread. */
     fun cancel() = handle.use(Native::cancelDensePose)
 
+    /**
+     * The next frames show the world rotated clockwise by [rollRad] radians (-7 to 7), as of a phone that is held
+     * askew: the networks see them rotated upright. From any thread. By the gravity sensor (`Sensor.TYPE_GRAVITY`) it is
+     * `atan2(x, y)`, of x to the right and y up in the frame's picture; of a front camera `atan2(-x, y)`.
+     */
+    fun setRoll(rollRad: Float) = handle.use { Native.setRollOfDensePose(it, rollRad) }
+
     /** The next frame begins another stream: a key frame. */
     fun reset() = handle.use(Native::resetDensePose)
 

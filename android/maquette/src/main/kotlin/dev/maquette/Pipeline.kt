@@ -153,6 +153,9 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
             NativePipeline.setDensePose(it, bundle.folder, bundle.names, bundle.buffers, config.values())
         }
 
+    /** [DensePose.setRoll] for the next frames, whatever the source and the model. */
+    fun setRoll(rollRad: Float) = handle.use { NativePipeline.setRoll(it, rollRad) }
+
     /** Pauses or resumes. The current frame is finished first; the source stays open. */
     fun setPaused(isPaused: Boolean) = handle.use { NativePipeline.setPaused(it, isPaused) }
 

@@ -75,6 +75,7 @@ internal object Native {
     @JvmStatic external fun destroyDensePose(densePose: Long)
     @JvmStatic external fun runDensePose(densePose: Long, frame: Long): Long
     @JvmStatic external fun cancelDensePose(densePose: Long)
+    @JvmStatic external fun setRollOfDensePose(densePose: Long, rollRad: Float)
     @JvmStatic external fun resetDensePose(densePose: Long)
     @JvmStatic external fun surfaceOfDensePose(densePose: Long): FloatArray?
 

@@ -36,6 +36,7 @@ internal object NativePipeline {
         values: DoubleArray,
     )
 
+    @JvmStatic external fun setRoll(pipeline: Long, rollRad: Float)
     @JvmStatic external fun setPaused(pipeline: Long, isPaused: Boolean)
     @JvmStatic external fun setRecording(pipeline: Long, path: ByteArray?)
     @JvmStatic external fun stop(pipeline: Long)

@@ -43,6 +43,9 @@ MIN_TEACHER_SCORE = 0.5
 MIN_VISIBLE = 0.6
 MIN_LIMB_LANDMARKS = 4  # of a person who is judged by left and right
 PRECISION = 0.9
+MIN_SHOULDERS = 0.4  # of the trunk's length: people who show less of them stand sideways
+MIN_TORSO_PIXELS = 50
+BACK, CHEST = 1, 2
 # Which parts may be painted at a landmark of BlazePose. A landmark lies inside the body, so front and back both count.
 _ALLOWED = {
     "nose": {23, 24}, "left ear": {23, 24}, "right ear": {23, 24},
@@ -64,6 +67,8 @@ figures:
   part at landmark         fraction of visible landmarks of those people with one of the parts painted there that belong
                            there; nothing painted is wrong
   left/right               of the landmarks of limbs with a limb painted, those with the right side
+  chest or back            of people with a torso painted whose shoulders show which way they face, those with more
+                           of the right side of it
   false people             shown per photo without people; per photo of animals
 
 example:
@@ -106,6 +111,7 @@ class PhotoFigures:
     mask_iou: float
     part_at_landmark: float
     left_right: float
+    chest_or_back: float
     empty_photos: int
     false_people: float
     animal_photos: int
@@ -127,6 +133,7 @@ class Tally:
         self.in_empty: list[FalseAlarm] = []
         self.by_animals: list[FalseAlarm] = []
         self.landmarks: dict[str, list[bool]] = {name: [] for name in _ALLOWED}
+        self.facing: list[bool] = []  # of each person whose chest or back is painted, whether it is the right one
         self.photos = self.empty = self.animals = 0
 
     def add(self, name: str, found: Prediction, labels: PhotoLabels) -> None:
@@ -142,6 +149,10 @@ class Tally:
             painted = (comparison.shown.inds == number) & (number > 0)
             part = np.where(painted, comparison.shown.iuv[..., 0], 0)
             asked, right, limb, same_side = self._landmarks(part, labels, k) if labels.sure[k] else (0, 0, 0, 0)
+            side = shown_side(labels, int(k))
+            torso = [int((part == value).sum()) for value in (BACK, CHEST)]
+            if side and sum(torso) >= MIN_TORSO_PIXELS:
+                self.facing.append(side == (CHEST if torso[1] > torso[0] else BACK))
             iou = float((painted & labels.mask[k]).sum() / max((painted | labels.mask[k]).sum(), 1))
             self.people.append(
                 PersonRecord(
@@ -200,6 +211,7 @@ class Tally:
             mask_iou=mean_mask_iou(self.people),
             part_at_landmark=part_accuracy(self.people),
             left_right=left_right(self.people),
+            chest_or_back=fraction(sum(self.facing), len(self.facing)),
             empty_photos=self.empty,
             false_people=fraction(len(self.in_empty), self.empty),
             animal_photos=self.animals,
@@ -209,6 +221,19 @@ class Tally:
             groups=breakdown(self.people),
             failures=worst_cases(self.people, self.alarms + self.in_empty + self.by_animals, MIN_LIMB_LANDMARKS),
         )
+
+
+def shown_side(labels: PhotoLabels, person: int) -> int:
+    """CHEST where a person's left shoulder lies to the right of the other, seen along the trunk, BACK where it lies to
+    the left; 0 where the landmarks don't say."""
+    joints = [NAMES.index(name) for name in ("left shoulder", "right shoulder", "left hip", "right hip")]
+    if not labels.sure[person] or (labels.visible[person, joints] < MIN_VISIBLE).any():
+        return 0
+    left, right, *hips = labels.point[person, joints].astype(np.float64)
+    trunk = (left + right) / 2 - np.mean(hips, 0)  # y points down
+    length = float(np.hypot(*trunk))
+    across = float((left - right) @ np.array([-trunk[1], trunk[0]])) / max(length * length, 1e-9)
+    return 0 if abs(across) < MIN_SHOULDERS else CHEST if across > 0 else BACK
 
 
 def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
@@ -305,6 +330,7 @@ def print_figures(name: str, figures: PhotoFigures) -> None:
         (f"mask IoU ({figures.masks} people)", figures.mask_iou),
         ("part at landmark", figures.part_at_landmark),
         ("left/right", figures.left_right),
+        ("chest or back", figures.chest_or_back),
         (f"false people a photo ({figures.empty_photos} photos)", figures.false_people),
         (f"false people a photo of animals ({figures.animal_photos} photos)", figures.false_people_by_animals),
         *figures.landmark.items(),

@@ -211,7 +211,8 @@ def main() -> None:
         print(f"views: median {views.median_px:.1f} px, at random in a part {views.random_px:.1f} px, "
               f"gain {views.gain:.2f} ({views.pairs} pairs, {views.matched:.0%} of the points matched)")  # fmt: skip
         results[name] = {**vars(views), "mask_iou": figures.mask_iou, "part_at_landmark": figures.part_at_landmark,
-                         "left_right": figures.left_right, "people": figures.people}  # fmt: skip
+                         "left_right": figures.left_right, "chest_or_back": figures.chest_or_back,
+                         "people": figures.people}  # fmt: skip
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(results, indent=1) + "\n")
 

@@ -65,6 +65,19 @@ def test_the_wrong_leg_is_wrong_in_part_and_side_but_the_torso_has_no_side():
     assert np.isnan(figures(painted(1), truth).left_right)
 
 
+def test_whose_left_shoulder_is_on_the_right_shows_the_chest():
+    facing = {"left_shoulder": (100, 60), "right_shoulder": (60, 60), "left_hip": (95, 120), "right_hip": (65, 120)}
+    away = {
+        name.replace("left", "r").replace("right", "left").replace("r_", "right_"): at for name, at in facing.items()
+    }
+    for truth, right in ((labels(**facing), 2), (labels(**away), 1)):
+        assert figures(painted(right), truth).chest_or_back == 1
+        assert figures(painted(3 - right), truth).chest_or_back == 0
+        assert np.isnan(figures(painted(9), truth).chest_or_back)  # no torso is painted
+    sideways = labels(left_shoulder=(85, 60), right_shoulder=(75, 60), left_hip=(82, 120), right_hip=(78, 120))
+    assert np.isnan(figures(painted(2), sideways).chest_or_back)
+
+
 def test_landmarks_outside_photo_or_mask_are_not_asked_for():
     truth = labels(left_knee=(60, 500), right_knee=(10, 10), left_hip=(60, 100))
     assert figures(painted(8), truth).landmark["left hip"] == 1

@@ -101,7 +101,9 @@ def main() -> None:
         keep("desktop-demo-next.jpg", bridged(Path(temporary)))
         progress.update()
         keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--next", "--surprise"))
-        keep("desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--next", "--uncertainty", "--sample", "--ahead", "300"))
+        keep(
+            "desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--next", "--uncertainty", "--sample", "--ahead", "300")
+        )
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

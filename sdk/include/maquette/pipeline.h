@@ -1,6 +1,6 @@
-/* Pipeline: runs a source and a model on a thread of the library, for apps that must not block: dense pose, or edges of
- * a depth camera with their curves. The newest frame is processed; frames that come while the model is busy are
- * dropped. Source, model and recording can be changed while it runs.
+/* Pipeline: runs a source and a model on a thread of the library, for apps that must not block: dense pose, edges of a
+ * depth camera with their curves, or what comes next and surprise. The newest frame is processed; frames that come
+ * while the model is busy are dropped. Source, model and recording can be changed while it runs.
  *
  *   maq_pipeline_create(context, &config, &pipeline);
  *   maq_pipeline_set_source(pipeline, "camera:");
@@ -15,6 +15,7 @@
 
 #include "maquette/densepose.h"
 #include "maquette/edge_curves.h"
+#include "maquette/prediction.h"
 #include "maquette/source.h"
 
 #ifdef __cplusplus
@@ -41,13 +42,21 @@ typedef struct maq_pipeline_result {
   uint32_t struct_size;
   maq_frame* frame;                /* the caller's: for maq_frame_release or maq_pipeline_release_result */
   maq_densepose_result* densepose; /* the caller's: for maq_densepose_result_release or maq_pipeline_release_result;
-                                      NULL where edges are found */
+                                      NULL where another model runs */
   uint64_t number;                 /* counts the results of the pipeline, from 1; gaps are results that were dropped */
   double wait_ms;                  /* time that the pipeline waited for the frame */
   double run_ms;                   /* time that the model took; see maq_densepose_result_get_stats for its stages */
   double age_ms;                   /* from the capture of a camera's frame to the result; -1 if unknown */
-  maq_edges_result* edges;         /* the caller's, as densepose; NULL where dense pose runs */
+  maq_edges_result* edges;         /* the caller's, as densepose; NULL where another model runs */
   maq_edges_curves* curves;        /* the caller's; NULL where they were not asked for */
+  /* By maq_pipeline_set_prediction: */
+  maq_frame* predicted; /* the caller's, as frame: what the source will show after it, marked (maq_frame_get_origin);
+                           NULL where another model runs */
+  float surprise_bits;  /* of frame, as in maq_surprise_score; so are the next four. -1 where it was not asked for */
+  float surprise_ratio;
+  int32_t is_event;
+  int32_t is_cut;
+  int32_t is_start;
 } maq_pipeline_result;
 
 /* Receives each result on the pipeline's thread, which waits meanwhile: return promptly. `result` is valid during the
@@ -147,6 +156,15 @@ MAQ_API maq_status maq_pipeline_set_edges(maq_pipeline* pipeline, const maq_edge
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_roll(maq_pipeline* pipeline, float roll_rad);
 
+/* The same with the picture that comes `ahead_s` seconds after each frame, 0 to 10, and with how surprising the frame
+ * is, unless `surprise` is NULL. The pipeline makes streams of its own with the settings and the networks of
+ * `predictor` and `surprise`, which stay the caller's, see none of its frames and may be destroyed at once. Frames are
+ * dropped while it runs: networks that take long, as those that draw, give few results a second. Gaps are not bridged
+ * (concealer.h). Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT; maq_pipeline_info has those of frames, as of a depth
+ * image. Does not block. */
+MAQ_API maq_status maq_pipeline_set_prediction(maq_pipeline* pipeline, const maq_predictor* predictor, double ahead_s,
+                                               const maq_surprise* surprise);
+
 /* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
  * open.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
@@ -186,8 +204,8 @@ MAQ_API maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipe
 
 /* Gets the surface that the model's labels refer to, once a model is loaded; like maq_densepose_get_surface. The points
  * live as long as the pipeline, also when the model is replaced.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none, as edges),
- * MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (no model is loaded, or it has none: only dense
+ * pose does), MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surface* surface);
 
 #ifdef __cplusplus

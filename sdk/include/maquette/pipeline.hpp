@@ -8,6 +8,7 @@
 #include "maquette/densepose.hpp"
 #include "maquette/edges.hpp"
 #include "maquette/pipeline.h"
+#include "maquette/prediction.hpp"
 
 namespace maquette {
 
@@ -26,17 +27,26 @@ struct PipelineResult {
         number(result.number),
         wait_ms(result.wait_ms),
         run_ms(result.run_ms),
-        age_ms(result.age_ms) {
+        age_ms(result.age_ms),
+        surprise_bits(result.surprise_bits),
+        surprise_ratio(result.surprise_ratio),
+        is_event(result.is_event != 0),
+        is_cut(result.is_cut != 0),
+        is_start(result.is_start != 0) {
     if (result.curves != nullptr) curves.emplace(result.curves);
     if (result.edges != nullptr) edges.emplace(result.edges);
+    if (result.predicted != nullptr) predicted.emplace(result.predicted);
   }
 
   Frame frame;
-  DensePoseResult densepose;          // get() is null where edges are found
-  std::optional<EdgesResult> edges;   // nothing where dense pose runs
+  DensePoseResult densepose;          // get() is null where another model runs
+  std::optional<EdgesResult> edges;   // nothing where another model runs
   std::optional<EdgesCurves> curves;  // nothing where they were not asked for
+  std::optional<Frame> predicted;     // nothing where another model runs
   uint64_t number;
   double wait_ms, run_ms, age_ms;
+  float surprise_bits, surprise_ratio;  // bits: -1 where surprise was not asked for
+  bool is_event, is_cut, is_start;      // of surprise
 };
 
 class Pipeline {
@@ -56,6 +66,11 @@ class Pipeline {
     check(maq_pipeline_set_edges(get(), &config, curves));
   }
   void set_roll(float roll_rad) { check(maq_pipeline_set_roll(get(), roll_rad)); }
+  // What comes, and surprise unless it is null: with the settings and networks of these.
+  void set_prediction(const Predictor& predictor, double ahead_s, const Surprise* surprise = nullptr) {
+    check(
+        maq_pipeline_set_prediction(get(), predictor.get(), ahead_s, surprise != nullptr ? surprise->get() : nullptr));
+  }
   void set_paused(bool is_paused) { check(maq_pipeline_set_paused(get(), is_paused ? 1 : 0)); }
   // "" ends the recording.
   void set_recording(const std::string& path) {

@@ -1,9 +1,11 @@
+#include <cmath>
 #include <optional>
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
 #include "api/densepose_handle.h"
 #include "api/edges_handle.h"
+#include "api/prediction_handles.h"
 #include "api/source_handle.h"
 #include "maquette/pipeline.h"
 #include "pipeline/pipeline.h"
@@ -17,8 +19,9 @@ constexpr double kMaxFrameBudgetMs = 60000;
 // Of the structs without the frame budget.
 constexpr size_t kFirstPipelineConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
 constexpr size_t kFirstPipelineStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
-// Of the struct without edges.
+// Of the struct without edges, and without prediction.
 constexpr size_t kFirstResultSize = offsetof(maq_pipeline_result, edges);
+constexpr size_t kEdgesResultSize = offsetof(maq_pipeline_result, predicted);
 
 // Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
@@ -33,7 +36,7 @@ maq_pipeline_config default_pipeline_config() {
 PipelineModel model_of(const maq_densepose_config* given, const char* name) {
   const maq_densepose_config config = read_densepose_config(given, name);
   const DensePoseSettings settings = densepose_settings(config, name);
-  return {bundle_reader(config, name, kDensePoseBundle), settings};
+  return {bundle_reader(config, name, kDensePoseBundle), settings, nullptr};
 }
 
 PipelineModel model_of(const maq_edges_config* given, const char* name, const maq_edges_curves_config* curves,
@@ -41,18 +44,41 @@ PipelineModel model_of(const maq_edges_config* given, const char* name, const ma
   const maq_edges_config config = read_edges_config(given, name);
   LiveEdgesSettings settings{edges_settings(config, name), std::nullopt};
   if (curves != nullptr) settings.curves = curve_request(curves, curves_name);
-  return {bundle_reader(config, name, kEdgesBundle), settings};
+  return {bundle_reader(config, name, kEdgesBundle), settings, nullptr};
+}
+
+// A stream of its own with the settings and the networks of the handles.
+PipelineModel model_of(const maq_predictor& predictor, double ahead_s, const maq_surprise* surprise) {
+  LivePredictionSettings settings;
+  if (predictor.by_network != nullptr) {
+    const NetworkPredictor& by_network = *predictor.by_network;
+    settings.by_network =
+        std::make_unique<NetworkPredictor>(by_network.networks(), by_network.settings(), by_network.threads());
+  } else {
+    settings.predictor = std::make_unique<Predictor>(predictor.predictor->settings());
+  }
+  settings.ahead_ns = std::llround(ahead_s * 1e9);
+  if (surprise != nullptr) {
+    settings.surprise = std::make_unique<Surprise>(surprise->surprise.encoder(), surprise->surprise.transformer());
+    settings.event_ratio = surprise->event_ratio;
+  }
+  return {nullptr, {}, make_live_prediction(std::move(settings))};
 }
 
 // The handles of results. A copy has the same pools.
 struct ResultPools {
   explicit ResultPools(uint32_t size)
-      : frames(size, "frames"), densepose(size, "results"), edges(size, "results"), curves(size, "curves") {}
+      : frames(size, "frames"),
+        densepose(size, "results"),
+        edges(size, "results"),
+        curves(size, "curves"),
+        predicted(size, "predicted frames") {}
 
   BoundedPool<maq_frame> frames;
   BoundedPool<maq_densepose_result> densepose;
   BoundedPool<maq_edges_result> edges;
   BoundedPool<maq_edges_curves> curves;
+  BoundedPool<maq_frame> predicted;
 };
 
 // A result of the pipeline in handles of the caller.
@@ -63,13 +89,15 @@ struct ResultHandles {
         frame(given.frames.acquire()),
         densepose(given.densepose.acquire()),
         edges(given.edges.acquire()),
-        curves(given.curves.acquire()) {}
+        curves(given.curves.acquire()),
+        predicted(given.predicted.acquire()) {}
 
   // Memory goes back and forth.
   void swap(PipelineOutput& made) {
     std::swap(densepose->result, made.densepose);
     std::swap(edges->result, made.edges);
     std::swap(curves->found, made.curves);
+    std::swap(predicted->frame, made.predicted);
   }
 
   maq_pipeline_result hand_over(const PipelineOutput& made, const PipelineTimes& times) {
@@ -80,12 +108,22 @@ struct ResultHandles {
     result.run_ms = times.run_ms;
     result.age_ms = times.age_ms;
     result.frame = lend<maq_frame>(std::move(frame));
-    if (made.is_edges) {
-      edges->curves = pools.curves;
-      result.edges = lend<maq_edges_result>(std::move(edges));
-      if (made.has_curves) result.curves = lend<maq_edges_curves>(std::move(curves));
-    } else {
-      result.densepose = lend<maq_densepose_result>(std::move(densepose));
+    result.surprise_bits = -1;
+    switch (made.kind) {
+      case LiveModelKind::kDensePose: result.densepose = lend<maq_densepose_result>(std::move(densepose)); break;
+      case LiveModelKind::kEdges:
+        edges->curves = pools.curves;
+        result.edges = lend<maq_edges_result>(std::move(edges));
+        if (made.has_curves) result.curves = lend<maq_edges_curves>(std::move(curves));
+        break;
+      case LiveModelKind::kPrediction:
+        result.predicted = lend<maq_frame>(std::move(predicted));
+        if (!made.has_surprise) break;
+        result.surprise_bits = made.surprise.bits;
+        result.surprise_ratio = made.surprise.ratio;
+        result.is_event = made.is_event ? 1 : 0;
+        result.is_cut = made.surprise.is_cut ? 1 : 0;
+        result.is_start = made.surprise.is_start ? 1 : 0;
     }
     return result;
   }
@@ -95,6 +133,7 @@ struct ResultHandles {
   BoundedPool<maq_densepose_result>::Pooled densepose;
   BoundedPool<maq_edges_result>::Pooled edges;
   BoundedPool<maq_edges_curves>::Pooled curves;
+  BoundedPool<maq_frame>::Pooled predicted;
 };
 
 PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std::shared_ptr<ContextState>& state,
@@ -212,6 +251,18 @@ maq_status maq_pipeline_set_roll(maq_pipeline* pipeline, float roll_rad) {
   });
 }
 
+maq_status maq_pipeline_set_prediction(maq_pipeline* pipeline, const maq_predictor* predictor, double ahead_s,
+                                       const maq_surprise* surprise) {
+  return guarded(pipeline, __func__, [&] {
+    require_argument(pipeline, "pipeline");
+    require_argument(predictor, "predictor");
+    require_range("ahead_s", ahead_s, 0.0, double(Predictor::kMaxAhead_ns) / 1e9);
+    if (surprise != nullptr) require_argument(surprise, "surprise");
+    pipeline->pipeline.set_model(model_of(*predictor, ahead_s, surprise));
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused) {
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
@@ -268,9 +319,10 @@ void maq_pipeline_release_result(maq_pipeline_result* result) {
   if (result == nullptr) return;
   maq_frame_release(std::exchange(result->frame, nullptr));
   maq_densepose_result_release(std::exchange(result->densepose, nullptr));
-  if (result->struct_size < sizeof *result) return;  // of an app that knows no edges
+  if (result->struct_size < kEdgesResultSize) return;  // of an app that knows no edges
   maq_edges_result_release(std::exchange(result->edges, nullptr));
   maq_edges_curves_release(std::exchange(result->curves, nullptr));
+  if (result->struct_size == sizeof *result) maq_frame_release(std::exchange(result->predicted, nullptr));
 }
 
 maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {

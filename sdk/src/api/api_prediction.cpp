@@ -5,24 +5,13 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/frame_handle.h"
+#include "api/prediction_handles.h"
 #include "api/source_handle.h"
 #include "core/worker_threads.h"
 #include "maquette/concealer.h"
 #include "pipeline/concealer.h"
-#include "prediction/networks/network_predictor.h"
-#include "prediction/predictor.h"
 
 using namespace maq;
-
-struct maq_predictor : HandleOf<HandleKind::kPredictor> {
-  maq_predictor(std::unique_ptr<Predictor> alone, std::unique_ptr<NetworkPredictor> by_networks, size_t pool_size)
-      : predictor(std::move(alone)), by_network(std::move(by_networks)), frames(pool_size, "predicted frames") {}
-  // One of these.
-  const std::unique_ptr<Predictor> predictor;
-  const std::unique_ptr<NetworkPredictor> by_network;
-  BoundedPool<maq_frame> frames;
-};
 
 struct maq_concealer : HandleOf<HandleKind::kConcealer> {
   maq_concealer(const maq_source& source, const ConcealerSettings& settings, size_t pool_size)

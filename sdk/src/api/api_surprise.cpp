@@ -2,43 +2,11 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/frame_handle.h"
+#include "api/prediction_handles.h"
 #include "core/clock.h"
 #include "core/worker_threads.h"
-#include "maquette/prediction.h"
-#include "prediction/codes/frame_decoder.h"
-#include "prediction/surprise/surprise.h"
 
 using namespace maq;
-
-namespace {
-
-// What streams can share.
-struct SurpriseNetworks {
-  std::shared_ptr<FrameEncoder> encoder;
-  std::shared_ptr<FrameDecoder> decoder;
-  std::shared_ptr<CodeTransformer> transformer;  // null: the table instead
-};
-
-}  // namespace
-
-struct maq_surprise : HandleOf<HandleKind::kSurprise> {
-  maq_surprise(std::shared_ptr<ContextState> of, SurpriseNetworks networks, float ratio)
-      : state(std::move(of)),
-        surprise(std::move(networks.encoder), std::move(networks.transformer)),
-        decoder(std::move(networks.decoder)),
-        event_ratio(ratio) {}
-  std::shared_ptr<ContextState> state;
-  Surprise surprise;
-  std::shared_ptr<FrameDecoder> decoder;
-  BoundedPool<maq_frame> pictures{4, "rebuilt pictures"};
-  int64_t timestamp_ns = 0;  // of the latest frame
-  uint64_t sequence = 0;
-  maq_clock clock = MAQ_CLOCK_MEDIA;
-  const float event_ratio;
-  float push_ms = 0;
-  uint64_t pushed = 0, events = 0, starts = 0;
-};
 
 namespace {
 
@@ -120,8 +88,7 @@ maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq
     surprise->timestamp_ns = frame->frame.timestamp_ns;
     surprise->sequence = frame->frame.sequence;
     surprise->clock = frame->frame.clock;
-    const float limit = surprise->event_ratio;
-    const bool is_event = found.is_cut || found.ratio >= limit || found.ratio * limit <= 1;
+    const bool is_event = found.is_event(surprise->event_ratio);
     surprise->pushed += 1;
     surprise->events += is_event ? 1 : 0;
     surprise->starts += found.is_start ? 1 : 0;

@@ -2,21 +2,43 @@
 // bounded and steady. An acquired object keeps the pool's memory alive, and may be returned from any thread.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <mutex>
+#include <string>
+#include <utility>
 #include <vector>
-
-#include "core/error.h"
 
 namespace maq {
 
+// What pools of all types share: once in the library, rather than for each of them.
+class PooledObjects {
+ public:
+  using Destroy = void (*)(void* object);
+
+  PooledObjects(size_t capacity, std::string what, Destroy destroy);
+  ~PooledObjects();
+  PooledObjects(const PooledObjects&) = delete;
+  PooledObjects& operator=(const PooledObjects&) = delete;
+
+  size_t capacity() const { return capacity_; }
+  // An idle object; nullptr where the caller may make another, or must forget() that. Throws MAQ_ERROR_POOL_EMPTY.
+  void* take();
+  void forget() noexcept;
+  void give_back(void* object) noexcept;
+
+ private:
+  const size_t capacity_;
+  const std::string what_;
+  const Destroy destroy_;
+  std::mutex mutex_;
+  std::vector<void*> idle_;
+  size_t made_ = 0;
+};
+
 template <class T>
 class BoundedPool {
-  struct State {
-    std::mutex mutex;
-    std::vector<std::unique_ptr<T>> idle;
-    size_t made = 0;
-  };
+  static void destroy(void* object) { delete static_cast<T*>(object); }
 
  public:
   // Returns an object to its pool; one that has no pool is deleted.
@@ -24,49 +46,39 @@ class BoundedPool {
    public:
     Deleter() = default;
     void operator()(T* object) const {
-      std::unique_ptr<T> owned(object);
-      if (state_ == nullptr) return;
-      std::lock_guard<std::mutex> lock(state_->mutex);
-      state_->idle.push_back(std::move(owned));
+      if (objects_ == nullptr) return destroy(object);
+      objects_->give_back(object);
     }
 
    private:
     friend BoundedPool;
-    explicit Deleter(std::shared_ptr<State> state) : state_(std::move(state)) {}
-    std::shared_ptr<State> state_;
+    explicit Deleter(std::shared_ptr<PooledObjects> objects) : objects_(std::move(objects)) {}
+    std::shared_ptr<PooledObjects> objects_;
   };
   using Pooled = std::unique_ptr<T, Deleter>;
 
   // `what` names the pooled thing in the error text: "frames".
   BoundedPool(size_t capacity, std::string what)
-      : state_(std::make_shared<State>()), capacity_(capacity), what_(std::move(what)) {
-    // Room for every object, so that returning one never allocates.
-    state_->idle.reserve(capacity_);
-  }
+      : objects_(std::make_shared<PooledObjects>(capacity, std::move(what), destroy)) {}
 
-  size_t capacity() const { return capacity_; }
+  size_t capacity() const { return objects_->capacity(); }
 
   // Throws MAQ_ERROR_POOL_EMPTY when every object is held. The object comes as its last user left it.
   Pooled acquire() const {
-    std::lock_guard<std::mutex> lock(state_->mutex);
-    std::unique_ptr<T> object;
-    if (!state_->idle.empty()) {
-      object = std::move(state_->idle.back());
-      state_->idle.pop_back();
-    } else if (state_->made == capacity_) {
-      throw Error(MAQ_ERROR_POOL_EMPTY, "All ", capacity_, " ", what_,
-                  " of the pool are held; release one, or ask for a larger pool_size.");
-    } else {
-      object = std::make_unique<T>();
-      ++state_->made;
+    auto* object = static_cast<T*>(objects_->take());
+    if (object == nullptr) {
+      try {
+        object = new T();
+      } catch (...) {
+        objects_->forget();
+        throw;
+      }
     }
-    return Pooled(object.release(), Deleter(state_));
+    return Pooled(object, Deleter(objects_));
   }
 
  private:
-  std::shared_ptr<State> state_;
-  size_t capacity_;
-  std::string what_;
+  std::shared_ptr<PooledObjects> objects_;
 };
 
 }  // namespace maq

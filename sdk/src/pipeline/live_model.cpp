@@ -13,7 +13,7 @@ class LiveDensePose : public LiveModel {
 
   void run(const Frame& frame, const maq_intrinsics*, PipelineOutput& output) override {
     densepose_.run(frame.image, output.densepose);
-    output.is_edges = output.has_curves = false;
+    output.kind = LiveModelKind::kDensePose;
   }
   void set_roll(float rad) override { densepose_.set_roll(rad); }
   void cancel() noexcept override { densepose_.cancel(); }
@@ -43,7 +43,7 @@ class LiveEdges : public LiveModel {
     // What has no depth is refused there, with or without a camera.
     edges_.run(frame, camera == nullptr ? maq_intrinsics{} : *camera, output.edges);
     if (curves_) finder_.find(output.edges.field, *curves_, output.curves);
-    output.is_edges = true;
+    output.kind = LiveModelKind::kEdges;
     output.has_curves = curves_.has_value();
   }
   void cancel() noexcept override { edges_.cancel(); }
@@ -53,6 +53,33 @@ class LiveEdges : public LiveModel {
   Edges edges_;
   std::optional<CurveRequest> curves_;
   CurveFinder finder_;
+};
+
+class LivePredictor : public LiveModel {
+ public:
+  explicit LivePredictor(LivePredictionSettings settings) : stream_(std::move(settings)) {}
+
+  void run(const Frame& frame, const maq_intrinsics*, PipelineOutput& output) override {
+    if (stream_.by_network != nullptr) {
+      stream_.by_network->push(frame);
+      stream_.by_network->predict(stream_.ahead_ns, output.predicted);
+    } else {
+      stream_.predictor->push(frame);
+      stream_.predictor->predict(stream_.ahead_ns, output.predicted);
+    }
+    output.kind = LiveModelKind::kPrediction;
+    output.has_surprise = stream_.surprise != nullptr;
+    if (!output.has_surprise) return;
+    output.surprise = stream_.surprise->push(frame);
+    output.is_event = output.surprise.is_event(stream_.event_ratio);
+  }
+  void forget() override {
+    stream_.by_network != nullptr ? stream_.by_network->reset() : stream_.predictor->reset();
+    if (stream_.surprise != nullptr) stream_.surprise->reset();
+  }
+
+ private:
+  LivePredictionSettings stream_;
 };
 
 }  // namespace
@@ -67,6 +94,10 @@ std::shared_ptr<LiveModel> make_live_model(std::shared_ptr<const OnnxRuntimeLibr
     return std::make_shared<LiveEdges>(std::move(runtime), std::move(bundle), *edges);
   }
   return std::make_shared<LiveDensePose>(std::move(runtime), bundle, std::get<DensePoseSettings>(model.settings));
+}
+
+std::shared_ptr<LiveModel> make_live_prediction(LivePredictionSettings settings) {
+  return std::make_shared<LivePredictor>(std::move(settings));
 }
 
 }  // namespace maq

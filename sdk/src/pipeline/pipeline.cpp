@@ -334,11 +334,14 @@ struct Pipeline::State {
     while (report_a_change()) {
     }
     show_model(nullptr);  // before the next one takes memory
-    Bundle bundle = now.model.read_bundle();
-    const Manifest manifest = bundle.manifest;
-    const auto loaded = make_live_model(settings.runtime(), std::move(bundle), now.model);
-    settings.source.log.write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
-                              ") loaded, ", loaded->threads(), " thread(s)");
+    std::shared_ptr<LiveModel> loaded = now.model.made;
+    if (loaded == nullptr) {
+      Bundle bundle = now.model.read_bundle();
+      const Manifest manifest = bundle.manifest;
+      loaded = make_live_model(settings.runtime(), std::move(bundle), now.model);
+      settings.source.log.write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
+                                ") loaded, ", loaded->threads(), " thread(s)");
+    }
     show_model(loaded);
     budget.reset();
     const FrameEffort full = loaded->effort();

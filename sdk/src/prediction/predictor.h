@@ -58,6 +58,7 @@ class Predictor {
   // Whether anything moved between the two newest frames; not where that is not known.
   bool moves() const { return moves_; }
   const PredictorStats& stats() const { return stats_; }
+  const PredictorSettings& settings() const { return settings_; }
 
  private:
   const PredictorSettings settings_;

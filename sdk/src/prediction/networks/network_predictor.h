@@ -75,6 +75,7 @@ class NetworkPredictor {
 
   const PredictionNetworks& networks() const { return networks_; }
   const NetworkSettings& settings() const { return settings_; }
+  int threads() const { return base_.settings().threads; }
   const PredictorStats& stats() const { return base_.stats(); }
   float networks_ms() const { return networks_ms_; }  // of the latest push, prediction or draw
   size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction or draw

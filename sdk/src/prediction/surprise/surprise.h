@@ -20,6 +20,8 @@ struct SurpriseScore {
   float ratio = 1;        // to the median of the kBefore frames before; 1 where fewer than kMinBefore are known
   bool is_start = false;  // it does not go on from the frame before, and has the bits of codes by themselves
   bool is_cut = false;    // nothing in it follows from the frame before
+
+  bool is_event(float min_ratio) const { return is_cut || ratio >= min_ratio || ratio * min_ratio <= 1; }
 };
 
 // Of the latest frame of a stream, in wall-clock milliseconds.

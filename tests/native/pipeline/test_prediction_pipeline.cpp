@@ -1,0 +1,206 @@
+// What comes next, and surprise, on the pipeline's thread.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstring>
+#include <limits>
+#include <maquette/maquette.hpp>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "support/wait_until.h"
+
+namespace {
+
+constexpr char kWalkers[] = "stub:people?size=96x72&frames=10";
+constexpr char kTinyNetworks[] = MAQ_TEST_DATA "/tiny_transformer/bundle";
+constexpr int64_t kPatienceNs = 60000000000;
+
+std::vector<uint8_t> pixels_of(const maquette::Frame& frame) {
+  const maq_frame_desc desc = frame.desc();
+  std::vector<uint8_t> pixels(size_t(desc.width_px) * size_t(desc.height_px) * 3);
+  frame.copy_pixels(MAQ_PIXEL_BGR8, pixels.data(), 0, pixels.size());
+  return pixels;
+}
+
+class PredictionPipeline : public testing::Test {
+ protected:
+  // A pipeline that keeps every result, none of which is dropped.
+  struct Kept {
+    explicit Kept(const maquette::Context& context) : pipeline(context, config()) {}
+    maq_pipeline_config config() {
+      maq_pipeline_config made = maquette::default_pipeline_config();
+      made.result_pool_size = 32;
+      made.result_user_data = this;
+      made.result_callback = [](void* self, const maq_pipeline_result* result) {
+        auto* const kept = static_cast<Kept*>(self);
+        const std::lock_guard<std::mutex> lock(kept->mutex);
+        kept->results.emplace_back(*result);
+      };
+      return made;
+    }
+    bool until_ended() {
+      return wait_until([&] { return pipeline.info().state == MAQ_PIPELINE_ENDED; });
+    }
+
+    std::mutex mutex;
+    std::vector<maquette::PipelineResult> results;
+    maquette::Pipeline pipeline;  // last: its thread uses the others
+  };
+
+  maquette::Predictor predictor(maq_prediction_method method) const {
+    maq_predictor_config config = maquette::default_predictor_config();
+    config.method = method;
+    config.network_mode = MAQ_NETWORK_DRAWN;
+    config.bundle_path = kTinyNetworks;
+    config.temperature = 1;
+    config.threads = 1;
+    return maquette::Predictor(context, config);
+  }
+  maquette::Surprise surprise() const {
+    maq_surprise_config config = maquette::default_surprise_config();
+    config.bundle_path = kTinyNetworks;
+    config.threads = 1;
+    config.event_ratio = 1.1f;
+    return maquette::Surprise(context, config);
+  }
+  // Frames are as a predictor and a surprise of the app's own make them.
+  void expect_as_alone(maq_prediction_method method) const {
+    Kept kept(context);
+    {
+      const maquette::Predictor lent = predictor(method);
+      const maquette::Surprise bits = surprise();
+      kept.pipeline.set_prediction(lent, 0.15, &bits);
+    }
+    kept.pipeline.set_source(kWalkers);
+    ASSERT_TRUE(kept.until_ended());
+    ASSERT_EQ(kept.results.size(), 10u);
+    maquette::Predictor own = predictor(method);
+    maquette::Surprise own_surprise = surprise();
+    for (const maquette::PipelineResult& result : kept.results) {
+      own.push(result.frame);
+      ASSERT_TRUE(result.predicted);
+      EXPECT_EQ(pixels_of(*result.predicted), pixels_of(own.predict(0.15)));
+      EXPECT_TRUE(result.predicted->is_predicted());
+      EXPECT_EQ(result.predicted->origin().horizon_ns, 150000000);
+      EXPECT_FALSE(result.frame.is_predicted());
+      EXPECT_EQ(result.densepose.get(), nullptr);
+      EXPECT_FALSE(result.edges);
+      const maq_surprise_score score = own_surprise.push(result.frame);
+      EXPECT_EQ(result.surprise_bits, score.bits);
+      EXPECT_EQ(result.surprise_ratio, score.ratio);
+      EXPECT_EQ(result.is_event, score.is_event != 0);
+      EXPECT_EQ(result.is_cut, score.is_cut != 0);
+      EXPECT_EQ(result.is_start, score.is_start != 0);
+      EXPECT_GT(result.run_ms, 0);
+    }
+    EXPECT_NE(pixels_of(*kept.results.back().predicted), pixels_of(kept.results.back().frame)) << "they walk";
+  }
+
+  const maquette::Context context;
+};
+
+TEST_F(PredictionPipeline, GivesWhatAPredictorAndASurpriseOfTheirOwnGive) { expect_as_alone(MAQ_PREDICTION_MOTION); }
+
+TEST_F(PredictionPipeline, NetworksAreThoseOfThePredictorWhichIsGone) { expect_as_alone(MAQ_PREDICTION_NETWORK); }
+
+TEST_F(PredictionPipeline, WithoutSurpriseThereIsNoneAndAnotherSourceBeginsAnew) {
+  Kept kept(context);
+  kept.pipeline.set_prediction(predictor(MAQ_PREDICTION_MOTION), 0.1);
+  for (size_t count : {10u, 20u}) {
+    kept.pipeline.set_source(kWalkers);
+    ASSERT_TRUE(wait_until([&] {
+      const std::lock_guard<std::mutex> lock(kept.mutex);
+      return kept.results.size() == count;
+    }));
+  }
+  for (size_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(kept.results[i].surprise_bits, -1);
+    EXPECT_FALSE(kept.results[i].is_event || kept.results[i].is_cut || kept.results[i].is_start);
+    EXPECT_EQ(pixels_of(*kept.results[i].predicted), pixels_of(*kept.results[10 + i].predicted)) << i;
+  }
+}
+
+TEST_F(PredictionPipeline, ModelsTakeTurns) {
+  maquette::Pipeline live(context, maquette::default_pipeline_config());
+  live.set_prediction(predictor(MAQ_PREDICTION_AUTO), 0.1);
+  live.set_source("stub:people?size=96x72&live=1&fps=200");
+  EXPECT_TRUE(live.next(kPatienceNs)->predicted);
+  EXPECT_EQ(live.stats().key_frame_interval, 0);
+  EXPECT_FALSE(live.surface());
+  maq_densepose_config people = maquette::default_densepose_config();
+  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  people.threads = 1;
+  live.stop();
+  live.set_densepose(people);
+  live.set_source("stub:people?size=96x72&live=1&fps=200");
+  const auto of_people = live.next(kPatienceNs);
+  EXPECT_NE(of_people->densepose.get(), nullptr);
+  EXPECT_FALSE(of_people->predicted);
+  EXPECT_EQ(of_people->surprise_bits, -1);
+  const maquette::Surprise bits = surprise();
+  live.stop();
+  live.set_prediction(predictor(MAQ_PREDICTION_LAST), 0, &bits);
+  live.set_source("stub:people?size=96x72&live=1&fps=200&drop=0.2");
+  for (int i = 0; i < 5; ++i) {
+    const auto result = live.next(kPatienceNs);
+    EXPECT_EQ(pixels_of(*result->predicted), pixels_of(result->frame));
+    EXPECT_GE(result->surprise_bits, 0);
+  }
+}
+
+TEST_F(PredictionPipeline, WhatCannotBePredictedFailsInASentence) {
+  maquette::Pipeline live(context, maquette::default_pipeline_config());
+  live.set_prediction(predictor(MAQ_PREDICTION_AUTO), 0.1);
+  live.set_source("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
+  try {
+    while (live.next(kPatienceNs)) {
+    }
+    ADD_FAILURE() << "it did not fail";
+  } catch (const maquette::Error& error) {
+    EXPECT_EQ(error.status(), MAQ_ERROR_UNSUPPORTED);
+    EXPECT_NE(std::strstr(error.what(), "epth"), nullptr) << error.what();
+  }
+  live.set_source(kWalkers);
+  EXPECT_TRUE(live.next(kPatienceNs)->predicted) << "another source goes on";
+}
+
+TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
+  maquette::Pipeline live(context, maquette::default_pipeline_config());
+  const maquette::Predictor right = predictor(MAQ_PREDICTION_AUTO);
+  const maquette::Surprise bits = surprise();
+  const auto refused = [&](maq_pipeline* pipeline, const maq_predictor* made, double ahead_s, const maq_surprise* score,
+                           const char* text) {
+    EXPECT_EQ(maq_pipeline_set_prediction(pipeline, made, ahead_s, score), MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
+  };
+  refused(nullptr, right.get(), 0.1, nullptr, "pipeline is NULL");
+  refused(live.get(), nullptr, 0.1, nullptr, "predictor is NULL");
+  for (const double wrong : {-0.01, 10.01, std::numeric_limits<double>::quiet_NaN()}) {
+    refused(live.get(), right.get(), wrong, nullptr, "ahead_s is");
+  }
+  refused(live.get(), reinterpret_cast<const maq_predictor*>(bits.get()), 0.1, nullptr, "predictor");
+  refused(live.get(), right.get(), 0.1, reinterpret_cast<const maq_surprise*>(right.get()), "surprise");
+}
+
+TEST_F(PredictionPipeline, AResultOfAnAppThatKnowsNoPredictionIsTakenAndReleased) {
+  maq_densepose_config people = maquette::default_densepose_config();
+  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  maq_pipeline_config config = maquette::default_pipeline_config();
+  config.densepose = &people;
+  maquette::Pipeline live(context, config);
+  live.set_source("stub:pattern?size=64x48");
+  maq_pipeline_result result;
+  std::memset(&result, 0x5a, sizeof result);
+  result.struct_size = offsetof(maq_pipeline_result, predicted);
+  ASSERT_EQ(maq_pipeline_acquire_result(live.get(), kPatienceNs, &result), MAQ_OK);
+  EXPECT_NE(result.densepose, nullptr);
+  EXPECT_EQ(result.curves, nullptr);
+  maq_pipeline_release_result(&result);
+  uint8_t beyond[sizeof result - offsetof(maq_pipeline_result, predicted)];
+  std::memcpy(beyond, &result.predicted, sizeof beyond);
+  for (const uint8_t byte : beyond) EXPECT_EQ(byte, 0x5a) << "is not its";
+}
+
+}  // namespace

@@ -69,7 +69,7 @@ def measure(
     films = real_films(photos, SIZE_PX, quick)
     if not films:
         absent.append(f"real clips ({photos} has none: python -m export.photos people)")
-    pushing = pushing_films(clips, 3 if quick else 24)
+    pushing = clip_films(clips, 3 if quick else 24)
     if not pushing:
         absent.append(f"pushing ({clips} has none: python -m export.clips.dataset pushing --split val --clips 16)")
     rows = [measure_film(film, threads) for film in tqdm([*films, *pushing], desc="prediction", disable=None)]
@@ -145,12 +145,15 @@ def read_film(path: Path, step: int, size_px: tuple[int, int]) -> list[np.ndarra
     return frames
 
 
-def pushing_films(folder: Path, most: int) -> list[Film]:
+def clip_films(folder: Path, most: int) -> list[Film]:
+    """Of a folder DATA/SET/SPLIT, at most so many clips that have frames of 320 x 240."""
     films = []
     for path in sorted(folder.glob("clip-*.npz"))[:most]:
         clip = read_clip(path)
         if clip.large is not None:
-            films.append(Film(f"pushing {path.stem[5:]}, {clip.fps:.0f} fps", clip.large.rgb[..., ::-1], clip.fps))
+            films.append(
+                Film(f"{folder.parent.name} {path.stem[5:]}, {clip.fps:.0f} fps", clip.large.rgb[..., ::-1], clip.fps)
+            )
     return films
 
 

@@ -32,6 +32,10 @@ def main() -> None:
     parser.add_argument("--clips", type=int, help="at most so many; default: all")
     parser.add_argument("--real", action="store_true")
     parser.add_argument("--photos", type=Path, default=Path(".data/photos/clip"), help="folder of real clips")
+    parser.add_argument(
+        "--convolutional", type=Path, default=Path(".data/runs/prediction-convolutional/weights.pt"), metavar="WEIGHTS",
+        help="of export.prediction.pictures.train_convolutional, to compare; left out where they are not there",
+    )  # fmt: skip
     parser.add_argument("--times", action="store_true")
     parser.add_argument("--threads", type=int, default=1, help="with --times (default %(default)s)")
     options = parser.parse_args()
@@ -43,11 +47,12 @@ def main() -> None:
         for name, own in found.items():
             print(f"{name} | {own:.1f} ms")
     else:
+        weights = options.convolutional if options.convolutional.exists() else None
         if options.real:
-            document, figures = measure_pictures(clips, np.empty(0), options.bundle, samples=4)
+            document, figures = measure_pictures(clips, np.empty(0), options.bundle, samples=4, weights=weights)
         else:
             others = real_clips(options.data, options.set, len(clips))
-            document, figures = measure_pictures(clips, others, options.bundle)
+            document, figures = measure_pictures(clips, others, options.bundle, weights=weights)
         for part in drawn_tables(document):
             print(part if isinstance(part, str) else "\n".join(" | ".join(row) for row in part) + "\n")
     print(json.dumps(figures))

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import maquette
 import numpy as np
+import torch
 from tqdm import tqdm
 
+from export.clips.clip import SIDE_PX
 from export.prediction.data import Clips
+from export.prediction.parallel import times_ahead
+from export.prediction.pictures.train_convolutional import load_convolutional
 
 GIVEN, MADE = 5, 11  # frames of a clip, as the published system has them
 SAMPLES = 16
 DRAWN = 3  # MAQ_NETWORK_DRAWN
 SEED = 1
+CONVOLUTIONAL = "convolutional"
 
 # Frames of a clip [GIVEN, H, W, 3], seconds between them -> pictures [samples, MADE, H, W, 3], and bits of their cells
 # [samples, MADE, 16, 16] or None.
@@ -55,25 +61,47 @@ def drawn(samples: int, bundle: Path, **settings: float) -> Method:
     return go_on
 
 
-def methods(bundle: Path, samples: int) -> dict[str, Method]:
-    return {
+def convolutional(weights: Path) -> Method:
+    """By the network without codes, in the manner of SimVP, in float: each time ahead at once, from the last three
+    frames."""
+    net = load_convolutional(weights)
+
+    @torch.no_grad()
+    def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, None]:
+        small = np.stack([cv2.resize(f, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA) for f in frames])
+        before = torch.from_numpy(small[-net.shape.frames :])[None].expand(MADE, -1, -1, -1, -1)
+        times = times_ahead(torch.full((MADE,), 1 / step_s), torch.arange(1.0, MADE + 1))
+        made = net.predicted(before, times).clamp(0, 255).round().to(torch.uint8).numpy()
+        size = frames.shape[2], frames.shape[1]
+        return np.stack([cv2.resize(picture, size) for picture in made])[None], None
+
+    return go_on
+
+
+def methods(bundle: Path, samples: int, weights: Path | None = None) -> dict[str, Method]:
+    """weights: of the convolutional network; None: without it."""
+    found = {} if weights is None else {CONVOLUTIONAL: convolutional(weights)}
+    return found | {
         "last frame": foreseen("last"),
         "motion": foreseen("motion"),
         "auto": foreseen("auto"),
         "likeliest": drawn(1, bundle, temperature=0),
         "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
         "likeliest, 4 passes": drawn(1, bundle, temperature=0, passes=4),
+        "temperature 0.25": drawn(4, bundle, temperature=0.25),
         "temperature 0.5": drawn(4, bundle, temperature=0.5),
         "temperature 1": drawn(samples, bundle, temperature=1),
     }
 
 
-def went_on(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def went_on(
+    clips: Clips, bundle: Path, samples: int, weights: Path | None = None
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """By method: pictures uint8 [clips, samples, MADE, H, W, 3], and where there are some bits of cells [clips,
     samples, MADE, 16, 16]."""
     pictures: dict[str, list[np.ndarray]] = {}
     bits: dict[str, list[np.ndarray]] = {}
-    known = methods(bundle, samples)
+    known = methods(bundle, samples, weights)
     for frames, fps in tqdm(zip(clips.frames.numpy(), clips.fps.numpy(), strict=True), total=len(clips), disable=None):
         for name, go_on in known.items():
             made, uncertain = go_on(frames[:GIVEN], 1 / float(fps))

@@ -28,7 +28,7 @@ def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str,
     """By method [clips, MADE]: of several samples the first, their mean, and the best of so many for each frame."""
     found = {name: psnr(own[:, 0], truth) for name, own in pictures.items()}
     samples = pictures["temperature 1"].shape[1]
-    for name in ("temperature 0.5", "temperature 1"):
+    for name in [name for name in pictures if name.startswith("temperature")]:
         own = pictures[name]
         of_each = np.stack([psnr(own[:, s], truth) for s in range(own.shape[1])], 1)
         for count in [count for count in (4, 8, SAMPLES) if count <= own.shape[1]]:
@@ -100,11 +100,12 @@ def uncertainties(clips: Clips, pictures: dict[str, np.ndarray], bits: dict[str,
 
 
 def measure_pictures(
-    clips: Clips, others: np.ndarray, bundle: Path, samples: int = SAMPLES
+    clips: Clips, others: np.ndarray, bundle: Path, samples: int = SAMPLES, weights: Path | None = None
 ) -> tuple[dict, dict[str, float]]:
-    """The document, and the figures but those of times. others: real clips, of real_clips()."""
+    """The document, and the figures but those of times. others: real clips, of real_clips(); weights: of the
+    convolutional network, which is compared where they are given."""
     truth = clips.frames[:, GIVEN : GIVEN + MADE].numpy()
-    pictures, bits = went_on(clips, bundle, samples)
+    pictures, bits = went_on(clips, bundle, samples, weights)
     decibels = pictures_db(pictures, truth)
     document: dict = {"clips": len(clips), "given": GIVEN, "made": MADE, "ahead": list(AHEAD)}
     document |= {"psnr_db": {}, "rank": {}, "reliability": {}}

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, Protocol
 
 import numpy as np
 
 from export.clips.clip import LARGE_PX, SIDE_PX, Frames
 from export.clips.motion import visible_next
-from export.clips.render import Labels, Moment, Renderer
+from export.clips.render import Labels
 
 
-def filmed(renderer: Renderer, moments: Sequence[Moment], large: bool) -> tuple[Frames, Frames | None]:
+class Filming(Protocol):
+    """What draws moments of its own kind: `render.Renderer`, `place_film.PlaceFilm`."""
+
+    def colour(self, moment: Any, sizes: Sequence[tuple[int, int]]) -> list[np.ndarray]: ...
+
+    def labels(self, moment: Any, then: Any, size: tuple[int, int]) -> Labels: ...
+
+
+def filmed(renderer: Filming, moments: Sequence[Any], large: bool) -> tuple[Frames, Frames | None]:
     """Frames of 64 x 64, and of 320 x 240 where `large`."""
     sizes = [(SIDE_PX, SIDE_PX), *([LARGE_PX] if large else [])]
     pictures = [renderer.colour(moment, sizes) for moment in moments]

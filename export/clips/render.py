@@ -151,10 +151,11 @@ def _shadow_matrix(light: Light) -> np.ndarray:
     return matrix
 
 
-def _projection(camera: Camera) -> np.ndarray:
-    """Camera to clip space; the picture's first row is drawn first, so that it is read first."""
+def projection(camera: Camera, near: float = _NEAR, far: float = _FAR) -> np.ndarray:
+    """Camera to clip space, [4, 4]; the picture's first row is drawn first, so that it is read first. near, far:
+    metres."""
     w, h = camera.width_px, camera.height_px
-    a, b = (_FAR + _NEAR) / (_FAR - _NEAR), -2 * _FAR * _NEAR / (_FAR - _NEAR)
+    a, b = (far + near) / (far - near), -2 * far * near / (far - near)
     return np.array([
         [2 * camera.fx_px / w, 0, (2 * camera.cx_px + 1) / w - 1, 0],
         [0, 2 * camera.fy_px / h, (2 * camera.cy_px + 1) / h - 1, 0],
@@ -163,7 +164,8 @@ def _projection(camera: Camera) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _view(camera: Camera) -> np.ndarray:
+def view_matrix(camera: Camera) -> np.ndarray:
+    """World to camera, [4, 4]."""
     return np.concatenate([camera.world_to_camera, [[0, 0, 0, 1]]])
 
 
@@ -231,9 +233,9 @@ class Renderer:
             buffers[k].write(np.ascontiguousarray(corners, np.float32).tobytes())
 
     def _draw(self, program: moderngl.Program, now: Moment, then: Moment, camera: Camera, camera_then: Camera) -> None:
-        self._set(program, "view", _view(camera))
-        self._set(program, "next_view", _view(camera_then))
-        self._set(program, "projection", _projection(camera))
+        self._set(program, "view", view_matrix(camera))
+        self._set(program, "next_view", view_matrix(camera_then))
+        self._set(program, "projection", projection(camera))
         self._set(program, "shadow_matrix", _shadow_matrix(self.light))
         self._set(program, "pinhole", (camera_then.fx_px, camera_then.fy_px, camera_then.cx_px, camera_then.cy_px))
         for k, thing in enumerate(self.things):

@@ -34,6 +34,7 @@ PHOTO_POSES = Path(__file__).with_name("photo_poses.json")
 _FLIP = np.diag([-1.0, 1, 1])
 _ZERO_AD_JOINTS = ("hip", "chest", "neck", "arm_L", "forearm_L", "hand_L", "arm_R", "forearm_R", "hand_R",
                    "thigh_L", "leg_L", "foot_L", "thigh_R", "leg_R", "foot_R")  # fmt: skip
+_ZERO_AD_FPS = 30.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,31 @@ class Clips:
     chest: np.ndarray
     limbs: np.ndarray
     rider: np.ndarray
+
+
+@dataclass(frozen=True)
+class MotionClip:
+    """One clip from its first frame to its last, with its turns: at first it faces the front. name: the file's; fps;
+    root, chest [N, 3, 3], limbs [N, 8, 3]; rider: seated on something."""
+
+    name: str
+    fps: float
+    root: np.ndarray
+    chest: np.ndarray
+    limbs: np.ndarray
+    rider: bool
+
+    def pose(self, seconds: float) -> Pose:
+        """Between the two frames next to that time, which must lie within the clip; the head looks with the chest."""
+        at = min(max(seconds * self.fps, 0.0), len(self.root) - 1.000001)
+        k, share = int(at), at % 1
+        turns = (Slerp([0, 1], Rotation.from_matrix(r[k : k + 2]))(share).as_matrix() for r in (self.root, self.chest))
+        root, chest = turns
+        return Pose(root, chest, chest, _unit((1 - share) * self.limbs[k] + share * self.limbs[k + 1]))
+
+    @property
+    def length_s(self) -> float:
+        return (len(self.root) - 1) / self.fps
 
 
 @dataclass(frozen=True)
@@ -96,12 +122,13 @@ def without_yaw(root: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
     return [*(turn @ r for r in rotations), np.einsum("nij,nlj->nli", turn, limbs)]
 
 
-def _zero_ad_clip(path: Path, order: list[str]):
-    """Reads one PSA clip: 7 floats a bone and frame (object-space position, quaternion)."""
+def _zero_ad_clip(path: Path, order: list[str], step: int = 2):
+    """Reads every `step`-th frame of one PSA clip, with its turns: 7 floats a bone and frame (object-space position,
+    quaternion)."""
     data = path.read_bytes()
     at = 16 + struct.unpack_from("<I", data, 12)[0]
     _, bones, frames = struct.unpack_from("<fII", data, at)
-    joints = np.frombuffer(data, "<f4", bones * frames * 7, at + 12).reshape(frames, bones, 7)[::2, :, :3]
+    joints = np.frombuffer(data, "<f4", bones * frames * 7, at + 12).reshape(frames, bones, 7)[::step, :, :3]
     # The game's y is up and its axes are left-handed: exchanging y and z makes them right-handed.
     joints = joints[:, [order.index(n) for n in _ZERO_AD_JOINTS]][..., [0, 2, 1]].astype(np.float64)
     p = dict(zip(_ZERO_AD_JOINTS, np.moveaxis(joints, 1, 0), strict=True))
@@ -109,11 +136,17 @@ def _zero_ad_clip(path: Path, order: list[str]):
     chest = _frames(p["arm_L"] - p["arm_R"], p["neck"] - p["chest"])
     ends = (("arm", "forearm"), ("forearm", "hand"), ("thigh", "leg"), ("leg", "foot"))
     limbs = [p[f"{b}_{s}"] - p[f"{a}_{s}"] for pair in (ends[:2], ends[2:]) for s in "LR" for a, b in pair]
-    return without_yaw(root, chest, _unit(np.stack(limbs, 1)))
+    return root, chest, _unit(np.stack(limbs, 1))
 
 
 def bullet_clip(path: Path):
-    """Reads one DeepMimic clip: duration, root position, then joint rotations (x forward, y up, z right)."""
+    """One DeepMimic clip, each frame facing the front."""
+    return without_yaw(*_bullet_clip(path)[1:])
+
+
+def _bullet_clip(path: Path):
+    """Reads one DeepMimic clip: duration, root position, then joint rotations (x forward, y up, z right). Returns
+    frames a second, and the rest with its turns."""
     frames = np.array(json.loads(path.read_text())["Frames"])
 
     def ball(at: int) -> Rotation:
@@ -135,23 +168,46 @@ def bullet_clip(path: Path):
     right_arm, left_arm = limb(chest, 25, 29), limb(chest, 39, 43)
     limbs = np.stack([*left_arm, *right_arm, *left_leg, *right_leg], 1) @ to_body.T
     turn = (to_body @ r.as_matrix() @ to_body.T for r in (root, chest))
-    return without_yaw(*turn, limbs)
+    return (1 / float(np.median(frames[:-1, 0])), *turn, limbs)
+
+
+def _zero_ad_files(split: str) -> list[tuple[Path, bool]]:
+    """The game's clips of a split, and whether who moves rides."""
+    paths = sorted((assets.zero_ad() / "animation" / "biped").rglob("*.psa"))
+    return [(p, bool(re.search("rider|chariot|elephant", str(p)))) for p in paths if split_of(p.stem) == split]
+
+
+def _bullet_files(split: str) -> list[Path]:
+    return [p for p in sorted(assets.bullet_motions().glob("humanoid3d_*.txt")) if split_of(p.stem) == split]
+
+
+def _zero_ad_bones() -> list[str]:
+    skeleton = ElementTree.parse(assets.zero_ad() / "skeletons" / "biped.xml").find("standard_skeleton")
+    return [bone.get("name") for bone in skeleton.iter("bone")]
+
+
+def load_motion_clips(split: str) -> list[MotionClip]:
+    """All clips of a split of half a second and more, one by one."""
+    order = _zero_ad_bones()
+    read = [(p.stem, _ZERO_AD_FPS, *_zero_ad_clip(p, order, 1), rider) for p, rider in _zero_ad_files(split)]
+    read += [(path.stem, *_bullet_clip(path), False) for path in _bullet_files(split)]
+    found = []
+    for name, fps, root, chest, limbs, rider in read:
+        if len(root) - 1 < 0.5 * fps or not all(np.isfinite(part).all() for part in (root, chest, limbs)):
+            continue
+        back = root[0, :, 1]
+        turn = _euler(0, 0, float(np.degrees(np.arctan2(back[0], back[1]))))
+        found.append(MotionClip(name, fps, turn @ root, turn @ chest, limbs @ turn.T, rider))
+    return found
 
 
 def load_clips(split: str) -> Clips:
     """Frames of all clips of a split; parsed once and cached."""
     cache = assets.cache_dir() / f"clips-{split}.npz"
     if not cache.exists():
-        skeleton = ElementTree.parse(assets.zero_ad() / "skeletons" / "biped.xml").find("standard_skeleton")
-        order = [bone.get("name") for bone in skeleton.iter("bone")]
-        parts = []
-        for path in sorted((assets.zero_ad() / "animation" / "biped").rglob("*.psa")):
-            if split_of(path.stem) == split:
-                rider = bool(re.search("rider|chariot|elephant", str(path)))
-                parts.append((*_zero_ad_clip(path, order), rider))
-        for path in sorted(assets.bullet_motions().glob("humanoid3d_*.txt")):
-            if split_of(path.stem) == split:
-                parts.append((*bullet_clip(path), False))
+        order = _zero_ad_bones()
+        parts = [(*without_yaw(*_zero_ad_clip(p, order)), rider) for p, rider in _zero_ad_files(split)]
+        parts += [(*bullet_clip(path), False) for path in _bullet_files(split)]
         root, chest, limbs = (np.concatenate([p[k] for p in parts]).astype(np.float32) for k in range(3))
         rider = np.concatenate([np.full(len(p[0]), p[3]) for p in parts])
         ok = np.isfinite(limbs).all((1, 2)) & np.isfinite(root).all((1, 2)) & np.isfinite(chest).all((1, 2))

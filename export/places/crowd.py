@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from export.people import assets
 from export.people.atlas import Atlas
-from export.people.body import Body, sample_phenotype
+from export.people.body import Body, Shape, sample_phenotype
 from export.people.motion import clip_pose, drawn_pose, load_clips, load_photo_poses
 from export.people.render import Person
 from export.people.scene import BODIES, SPLITS
@@ -28,7 +28,7 @@ class Crowd:
         self.model = Model(self.body, Atlas(self.body))
         self.clips = load_clips(split)
         self.director = Director(
-            self.model, Fabrics(split, photos), self.clips, load_photo_poses(split), self._shape, BODIES[split], (1, 1)
+            self.model, Fabrics(split, photos), self.clips, load_photo_poses(split), self.shape, BODIES[split], (1, 1)
         )
         skin = cv2.resize(cv2.imread(str(assets.skin_texture())), (1024, 1024), interpolation=cv2.INTER_AREA)
         self.skin = np.ascontiguousarray(skin[..., ::-1])
@@ -36,21 +36,23 @@ class Crowd:
         corner_of = (faces.reshape(-1), np.repeat(np.arange(len(faces)), 3))
         self.gather = sp.csr_matrix((np.ones(faces.size, np.float32), corner_of), (len(self.model.rest), len(faces)))
 
-    def _shape(self, number: int):
-        return self.body.shape(sample_phenotype(np.random.default_rng([SPLITS[self.split], number])))
-
     def somebody(self, rng: np.random.Generator) -> tuple[list[Part], tuple[float, float, float]]:
         """A person with what belongs to them, on z = 0 at the origin, facing -y; and width, depth, height in metres."""
         pose = clip_pose(rng, self.clips) if rng.random() < 0.4 else drawn_pose(rng)
         actor = self.director.actor(rng, pose, 0.0)
-        parts = [*self._parts(actor.person, rng), *(part_of_prop(p) for p in (*actor.person.worn, *actor.props))]
+        parts = [*self.parts(actor.person, rng), *(part_of_prop(p) for p in (*actor.person.worn, *actor.props))]
         points = np.concatenate([p.corners.reshape(-1, 3) for p in parts])
         low, high = points.min(0), points.max(0)
         middle = (low[:2] + high[:2]) / 2
         shift = np.array([-middle[0], -middle[1], max(0.0, -low[2])])
         return [p.moved(np.eye(3), shift) for p in parts], tuple(map(float, high - low))
 
-    def _parts(self, person: Person, rng: np.random.Generator) -> list[Part]:
+    def shape(self, number: int) -> Shape:
+        """Body `number` of this split."""
+        return self.body.shape(sample_phenotype(np.random.default_rng([SPLITS[self.split], number])))
+
+    def parts(self, person: Person, rng: np.random.Generator) -> list[Part]:
+        """The body and what is on its skin, where its vertices are; rng: how fabrics lie."""
         corners = person.vertices[self.model.faces]
         face_normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal = self.gather @ face_normal

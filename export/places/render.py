@@ -7,7 +7,7 @@ highlights (Blinn-Phong, each material its own exponent), reflections of the sur
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 os.environ.setdefault("LP_NUM_THREADS", "1")  # the software rasteriser; processes are the parallelism here
 
@@ -15,122 +15,16 @@ import moderngl
 import numpy as np
 
 from export.camera import Camera
+from export.places import shaders
 from export.places.mesh import Part
 
-_FAR = 4000.0  # times the distance before which nothing is seen
+FAR = 4000.0  # times the distance before which nothing is seen
 _SAMPLES = 4  # of colour, a pixel; depth is that of the pixel's centre
 _KEY_MAP, _SKY_MAP, _SKY = 2048, 512, 8  # texels a side, texels a side, directions that light comes from
 _ATLAS = 3  # sky maps in a row of their common texture
 _LIGHTS = 4
 _BRIGHTEST = 15.0  # of the surroundings: mirrored lamps would be white patches else
 _OFFSET = 2.0  # texels before a surface, where its own roughness in a depth map does not shade it
-
-_VERTEX = """#version 330
-in vec3 position; in vec3 normal; in vec2 uv; in float cut;
-uniform mat4 projection, view;
-out vec3 at; out vec3 v_normal; out vec2 v_uv; out float v_cut; out float depth;
-void main() {
-  vec4 seen = view * vec4(position, 1);
-  gl_Position = projection * seen;
-  at = position; v_normal = normal; v_uv = uv; v_cut = cut; depth = seen.z;
-}"""
-
-_CUTTING = """
-  if (v_cut < 0. || texture(albedo, v_uv).a < .5) discard;"""
-
-_DEPTH = """#version 330
-in vec2 v_uv; in float v_cut; in float depth; uniform sampler2D albedo;
-layout(location = 0) out float found;
-void main() {CUTTING
-  found = depth;
-}"""
-
-_COLOUR = """#version 330
-in vec3 at; in vec3 v_normal; in vec2 v_uv; in float v_cut;
-uniform sampler2D albedo, surroundings; uniform sampler2DShadow key_map, sky_map;
-uniform mat4 key_matrix, sky_matrix[SKY_LIGHTS];
-uniform vec3 sky_towards[SKY_LIGHTS], sky_colour[SKY_LIGHTS], bounce, eye;
-uniform vec4 light_at[LIGHTS]; uniform vec3 light_colour[LIGHTS];
-uniform vec3 tint; uniform float specular, shininess, mirror, opacity, emission, exposure, reflection;
-uniform float key_offset, sky_offset;
-out vec4 colour;
-float key_light(vec3 p) {
-  vec4 q = key_matrix * vec4(p, 1);
-  if (q.w <= 0.) return 1.;
-  vec3 s = q.xyz / q.w * .5 + .5;
-  if (any(lessThan(s.xy, vec2(0))) || any(greaterThan(s.xy, vec2(1))) || s.z > 1.) return 1.;
-  vec3 step = vec3(1., -1., 0.) / KEY_MAP.;  // four looks, each of which averages four texels
-  return (texture(key_map, s + step.xxz) + texture(key_map, s + step.xyz) + texture(key_map, s + step.yxz)
-        + texture(key_map, s + step.yyz)) / 4.;
-}
-void main() {CUTTING
-  vec3 flat_normal = normalize(cross(dFdx(at), dFdy(at)));
-  vec3 ray = normalize(eye - at);
-  if (dot(flat_normal, ray) < 0.) flat_normal = -flat_normal;
-  vec3 n = dot(v_normal, v_normal) > 0. ? normalize(v_normal) : flat_normal;
-  if (dot(n, flat_normal) < 0.) n = -n;
-  vec3 base = pow(clamp(texture(albedo, v_uv).rgb * tint, 0., 1.), vec3(2.2));
-  vec3 origin = at + sky_offset * flat_normal;
-  vec3 light = bounce * (.75 - .25 * n.z), shine = vec3(0);
-  float open = 0.;
-  for (int k = 0; k < SKY_LIGHTS; ++k) {
-    float facing = dot(n, sky_towards[k]);
-    if (facing <= 0.) continue;
-    vec3 s = (sky_matrix[k] * vec4(origin, 1)).xyz * .5 + .5;
-    float lit = 1.;
-    if (all(greaterThan(s, vec3(0))) && all(lessThan(s, vec3(1)))) {
-      vec2 cell = vec2(mod(float(k), ATLAS.), floor(float(k) / ATLAS.));
-      lit = texture(sky_map, vec3((cell + clamp(s.xy, .002, .998)) / ATLAS., s.z));
-    }
-    light += facing * lit * sky_colour[k];
-    open += facing * lit;
-  }
-  for (int k = 0; k < LIGHTS; ++k) {
-    vec3 to = light_at[k].xyz - at * light_at[k].w;
-    float far2 = mix(1., dot(to, to), light_at[k].w);
-    to = normalize(to);
-    float facing = dot(n, to);
-    if (facing <= 0. || light_colour[k] == vec3(0)) continue;
-    vec3 arrives = light_colour[k] / (far2 + .1 * light_at[k].w);
-    if (k == 0) arrives *= key_light(at + key_offset * flat_normal);
-    light += facing * arrives;
-    // The factor keeps the highlight's whole energy about the same for every exponent.
-    shine += arrives * specular * (shininess + 8.) / 32. * pow(max(0., dot(n, normalize(to + ray))), shininess);
-  }
-  if (mirror > 0.) {
-    vec3 d = reflect(-ray, n);
-    float fresnel = mirror + (1. - mirror) * pow(1. - max(0., dot(n, ray)), 5.) * min(1., 4. * mirror);
-    float level = max(0., 6. - .8 * log2(shininess));
-    vec2 where = vec2(atan(d.y, d.x) / 6.2831853, acos(clamp(d.z, -1., 1.)) / 3.14159265);
-    shine += fresnel * min(1., .3 + .35 * open) * reflection * textureLod(surroundings, where, level).rgb;
-  }
-  vec3 shown = base * (light + emission) + shine;
-  shown = pow(1. - exp(-exposure * shown), vec3(1. / 2.2));
-  colour = vec4(shown, clamp(opacity + dot(shine, vec3(.3)), 0., 1.));
-}"""
-
-_BEHIND_VERTEX = """#version 330
-in vec2 corner; out vec2 ndc;
-void main() { ndc = corner; gl_Position = vec4(corner, 1, 1); }"""
-
-_BEHIND = """#version 330
-in vec2 ndc; uniform sampler2D surroundings; uniform mat3 unproject; uniform float exposure; uniform vec4 plain;
-out vec4 colour;
-void main() {
-  vec3 d = normalize(unproject * vec3(ndc, 1));
-  vec2 where = vec2(atan(d.y, d.x) / 6.2831853, acos(clamp(d.z, -1., 1.)) / 3.14159265);
-  vec3 shown = pow(1. - exp(-exposure * textureLod(surroundings, where, 0.).rgb), vec3(1. / 2.2));
-  colour = vec4(mix(shown, plain.rgb, plain.a), 1);
-}"""
-
-_SHADOW_VERTEX = """#version 330
-in vec3 position; in vec2 uv; in float cut; uniform mat4 matrix; out vec2 v_uv; out float v_cut;
-void main() { gl_Position = matrix * vec4(position, 1); v_uv = uv; v_cut = cut; }"""
-
-_SHADOW = """#version 330
-in vec2 v_uv; in float v_cut; uniform sampler2D albedo;
-void main() {CUTTING
-}"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,11 +77,18 @@ def _from_lamp(at: np.ndarray, towards: np.ndarray, degrees: float = 150.0) -> n
     return np.array([[f, 0, 0, 0], [0, f, 0, 0], [0, 0, a, b], [0, 0, 1, 0]]) @ view
 
 
+def _packed(part: Part) -> np.ndarray:
+    """What the buffer of a part holds: float32 [F, 3, 9]."""
+    cut = np.ones(part.corners.shape[:2], np.float32) if part.cut is None else part.cut
+    return np.concatenate([part.corners, part.normals, part.uv, cut[..., None]], 2).astype(np.float32)
+
+
 @dataclass(eq=False)
 class _Drawn:
-    """A part on the graphics side."""
+    """A part on the graphics side. buffer: of each corner position [3], normal [3], uv [2] and cut, float32."""
 
     part: Part
+    buffer: moderngl.Buffer
     arrays: dict[str, moderngl.VertexArray]
     texture: moderngl.Texture
     middle: np.ndarray
@@ -205,10 +106,12 @@ class Renderer:
         self.context = moderngl.create_context(standalone=True, backend="egl")
         self.lighting = lighting
         self.programs = {}
-        for name, cutting in (("whole", ""), ("cut", _CUTTING)):
+        for name, cutting in (("whole", ""), ("cut", shaders.CUTTING)):
             for kind, vertex, fragment in (
-                ("colour", _VERTEX, _COLOUR), ("depth", _VERTEX, _DEPTH), ("shadow", _SHADOW_VERTEX, _SHADOW),
-            ):  # fmt: skip
+                ("colour", shaders.VERTEX, shaders.COLOUR),
+                ("depth", shaders.VERTEX, shaders.DEPTH),
+                ("shadow", shaders.SHADOW_VERTEX, shaders.SHADOW),
+            ):
                 fragment = fragment.replace("CUTTING", cutting)
                 for figure, value in (
                     ("KEY_MAP", _KEY_MAP),
@@ -218,7 +121,7 @@ class Renderer:
                 ):
                     fragment = fragment.replace(figure, str(value))
                 self.programs[kind, name] = self.context.program(vertex_shader=vertex, fragment_shader=fragment)
-        self.behind = self.context.program(vertex_shader=_BEHIND_VERTEX, fragment_shader=_BEHIND)
+        self.behind = self.context.program(vertex_shader=shaders.BEHIND_VERTEX, fragment_shader=shaders.BEHIND)
         corners = np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)
         self.behind_array = self.context.vertex_array(
             self.behind, [(self.context.buffer(corners.tobytes()), "2f", "corner")]
@@ -231,6 +134,7 @@ class Renderer:
         self.surroundings = self.context.texture(around.shape[1::-1], 3, around.tobytes(), dtype="f2", alignment=1)
         self.surroundings.repeat_y = False
         self.surroundings.build_mipmaps()
+        self._place_lights()
         self._cast_shadows()
         self._light()
 
@@ -250,10 +154,18 @@ class Renderer:
         texture.anisotropy = 8.0
         return texture
 
+    def show(self, parts: list[Part], shadows: bool = True) -> None:
+        """The last of the parts that the place was made of, elsewhere or in another shape: each with as many triangles
+        as before; materials stay. shadows: whether they are cast anew."""
+        self.context.__enter__()
+        for drawn, part in zip(self.drawn[-len(parts) :] if parts else [], parts, strict=True):
+            drawn.part = replace(part, material=drawn.part.material)
+            drawn.buffer.write(_packed(part).tobytes())
+        if shadows and parts:
+            self._cast_shadows()
+
     def _upload(self, part: Part) -> _Drawn:
-        cut = np.ones(part.corners.shape[:2], np.float32) if part.cut is None else part.cut
-        packed = np.concatenate([part.corners, part.normals, part.uv, cut[..., None]], 2).astype(np.float32)
-        buffer = self.context.buffer(packed.tobytes())
+        buffer = self.context.buffer(_packed(part).tobytes())
         image = part.material.texture
         if image is not None and id(image) not in self.textures:
             self.textures[id(image)] = self._texture(image)
@@ -267,7 +179,7 @@ class Renderer:
             layout = " ".join(f"{size}f" if n else f"{4 * size}x" for n, size in kept)
             arrays[kind] = self.context.vertex_array(program, [(buffer, layout, *[n for n, _ in kept if n])])
         middle = (part.corners.reshape(-1, 3).min(0) + part.corners.reshape(-1, 3).max(0)) / 2
-        return _Drawn(part, arrays, texture, middle, name)
+        return _Drawn(part, buffer, arrays, texture, middle, name)
 
     def _set(self, program: moderngl.Program, name: str, value) -> None:
         if name in program:  # the compiler drops those that nothing uses
@@ -276,9 +188,12 @@ class Renderer:
             else:
                 program[name].value = value
 
-    def _cast_shadows(self) -> None:
-        """Depth maps of the key light and of light from all over the sky."""
-        casting = [d for d in self.drawn if d.part.shades and d.part.material.opacity >= 1]
+    def _casting(self) -> list[_Drawn]:
+        return [d for d in self.drawn if d.part.shades and d.part.material.opacity >= 1]
+
+    def _place_lights(self) -> None:
+        """What the key light and light from all over the sky see of the place, and depth maps for it."""
+        casting = self._casting()
         points = np.concatenate([d.part.corners.reshape(-1, 3) for d in casting] or [np.zeros((1, 3))])
         low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)
         self.reach = float(np.linalg.norm(high - low)) + 2e-3
@@ -293,7 +208,11 @@ class Renderer:
         self.sky_matrices = [_from_far(towards, low, high) for towards in self.sky]
         self.key_map = self._depth_map((_KEY_MAP, _KEY_MAP))
         self.sky_map = self._depth_map((_SKY_MAP * _ATLAS, _SKY_MAP * _ATLAS))
-        self.context.enable(moderngl.DEPTH_TEST)
+
+    def _cast_shadows(self) -> None:
+        """Draws the depth maps."""
+        casting = self._casting()
+        self.context.enable_only(moderngl.DEPTH_TEST)
         self._fill(self.key_map, [(self.key_matrix, (0, 0, _KEY_MAP, _KEY_MAP))], casting)
         cells = [(k % _ATLAS * _SKY_MAP, k // _ATLAS * _SKY_MAP, _SKY_MAP, _SKY_MAP) for k in range(_SKY)]
         self._fill(self.sky_map, list(zip(self.sky_matrices, cells, strict=True)), casting)
@@ -355,7 +274,7 @@ class Renderer:
     def _set_view(self, kind: str, camera: Camera) -> None:
         fx, fy, cx, cy = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
         w, h = camera.width_px, camera.height_px
-        far = _FAR * self.near
+        far = FAR * self.near
         a, b = (far + self.near) / (far - self.near), -2 * far * self.near / (far - self.near)
         # y stays "down", so that the first row read back is the top row.
         projection = np.array(

@@ -14,7 +14,7 @@ from export.places.render import Lighting
 from export.places.rooms import Staged, checks, own_table, planks
 
 
-def _outdoors(stock, rng: np.random.Generator, assets: list[Asset]) -> Lighting:
+def outdoors(stock, rng: np.random.Generator, assets: list[Asset]) -> Lighting:
     """The light of a panorama: its brightest spots as lamps far away, the rest as sky and ground."""
     u = rng.uniform
     radiance, asset = stock.panorama(rng)
@@ -38,8 +38,8 @@ def _outdoors(stock, rng: np.random.Generator, assets: list[Asset]) -> Lighting:
     return Lighting(tuple(lamps), sky, bounce, around, u(0.5, 1), plain)
 
 
-def _ground(stock, rng: np.random.Generator, assets: list[Asset], radius: float) -> Part:
-    """A disc to stand on, its top at z = 0."""
+def ground(stock, rng: np.random.Generator, assets: list[Asset], radius: float, repeats: float | None = None) -> Part:
+    """A disc to stand on, its top at z = 0; repeats: of its texture, a metre, instead of a few on the disc."""
     u = rng.uniform
     kind = u()
     if kind < 0.7:
@@ -50,7 +50,8 @@ def _ground(stock, rng: np.random.Generator, assets: list[Asset], radius: float)
     shine = {"specular": u(0, 0.4), "shininess": u(15, 120), "mirror": u(0, 0.12) if u() < 0.4 else 0.0}
     material = Material(texture, (u(0.7, 1.1),) * 3, **shine)
     solid = cylinder(radius, 0.02 * radius, (0, 0, -0.01 * radius), sides=96)
-    return part_of(solid, material, repeats=1 / (radius * u(0.3, 0.9)), shades=False)
+    own_repeats = 1 / (radius * u(0.3, 0.9))
+    return part_of(solid, material, repeats=repeats or own_repeats, shades=False)
 
 
 def draw_subject(stock, rng: np.random.Generator, lens: Lens, count: int) -> Staged:
@@ -66,12 +67,12 @@ def draw_subject(stock, rng: np.random.Generator, lens: Lens, count: int) -> Sta
         model = models[rng.integers(len(models))]
         parts, size, kind = finished(list(stock.parts(model)), rng, 0.5), model.size, "object"
         assets.append(model.asset)
-    lighting = _outdoors(stock, rng, assets)
+    lighting = outdoors(stock, rng, assets)
     reach = float(np.linalg.norm(size)) / 2
-    ground = _ground(stock, rng, assets, reach * u(1.6, 4))
+    disc = ground(stock, rng, assets, reach * u(1.6, 4))
     middle = np.array([0, 0, size[2] * u(0.4, 0.6)])
     cameras = _around(rng, lens, count, middle, reach, floor=0.05 * reach)
-    return Staged(kind, [*placed(parts, (0, 0, 0), u(0, 6)), ground], lighting, cameras, assets, near=0.1 * reach)
+    return Staged(kind, [*placed(parts, (0, 0, 0), u(0, 6)), disc], lighting, cameras, assets, near=0.1 * reach)
 
 
 def draw_still_life(stock, rng: np.random.Generator, lens: Lens, count: int) -> Staged:
@@ -95,8 +96,8 @@ def draw_still_life(stock, rng: np.random.Generator, lens: Lens, count: int) -> 
                 parts += placed(finished(list(stock.parts(model)), rng, 0.5), (*at, level), yaw)
                 assets.append(model.asset)
                 break
-    lighting = _outdoors(stock, rng, assets)
-    parts.append(_ground(stock, rng, assets, u(1.5, 4)))
+    lighting = outdoors(stock, rng, assets)
+    parts.append(ground(stock, rng, assets, u(1.5, 4)))
     middle = np.array([*u(-0.1, 0.1, 2), size[2] + u(0, 0.1)])
     cameras = _around(rng, lens, count, middle, crowded * max(size[:2]) * u(0.7, 1.1), floor=size[2] + 0.12)
     return Staged("still life", parts, lighting, cameras, assets, near=0.03)

@@ -10,7 +10,8 @@ CODE_SIDE = 16  # codes a side of a frame of 64 x 64
 @dataclass(frozen=True)
 class AutoencoderShape:
     """widths: channels at 32 x 32 and at 16 x 16; residual: channels within a residual block; slices: codes a place,
-    each from a codebook of `entries`; depth_to_space: convolution and rearrangement for transposed convolutions."""
+    each from a codebook of `entries`; depth_to_space: convolution and rearrangement for transposed convolutions; side:
+    places of a frame in a row, 16 or 8 (everything behind the autoencoder takes 16)."""
 
     widths: tuple[int, int] = (64, 128)
     residual: int = 64
@@ -18,6 +19,7 @@ class AutoencoderShape:
     slices: int = 4
     entries: int = 512
     depth_to_space: bool = True
+    side: int = CODE_SIDE
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--size", choices=AUTOENCODERS, default="light")
     parser.add_argument("--slices", type=int, help="codes a place (default 4)")
     parser.add_argument("--entries", type=int, help="of each codebook (default 512)")
+    parser.add_argument("--side", type=int, choices=(8, 16), help="places of a frame in a row (default 16)")
     parser.add_argument(
         "--stills", type=Path, help="folder of photographs, a quarter of the frames (.data/backgrounds/train)"
     )
@@ -83,7 +84,7 @@ def train(arguments: argparse.Namespace) -> None:
     run.begin(arguments)
     clips, held_out = (read_clips(arguments.data, arguments.sets, split) for split in ("train", "val"))
     print(f"{len(clips)} clips to train on, {len(held_out)} held out", flush=True)
-    changed = {name: value for name in ("slices", "entries") if (value := getattr(arguments, name))}
+    changed = {name: value for name in ("slices", "entries", "side") if (value := getattr(arguments, name))}
     shape = AutoencoderShape(**(asdict(AUTOENCODERS[arguments.size]) | changed))
     training = Training(shape, arguments.bf16, arguments.device)
     clips, held_out = clips.on(training.device), held_out.on(training.device)

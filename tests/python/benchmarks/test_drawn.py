@@ -97,6 +97,23 @@ def test_clips_go_on_by_every_method():
     assert not (pictures[0] == pictures[1]).all()
 
 
+def test_the_convolutional_network_makes_every_time_ahead_in_the_size_of_the_frames(tmp_path):
+    import torch
+
+    from benchmarks.drawn import continuations
+    from export.prediction.pictures.convolutional import ConvolutionalShape
+    from export.prediction.pictures.train_convolutional import Training
+
+    training = Training(ConvolutionalShape(widths=(4, 4, 4), blocks=1))
+    torch.save(training.weights(), tmp_path / "weights.pt")
+    frames = np.full((continuations.GIVEN, 60, 80, 3), 9, np.uint8)
+    frames[-1] = 200
+    made, bits = continuations.convolutional(tmp_path / "weights.pt")(frames, 0.1)
+    assert made.shape == (1, continuations.MADE, 60, 80, 3)
+    assert bits is None
+    assert np.abs(made.astype(int) - 200).max() <= 1  # a new network repeats the last frame
+
+
 @needs_library
 def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
     import torch
@@ -120,7 +137,7 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
         return go_on
 
     known |= {"likeliest": drawn_by(1), "temperature 0.5": drawn_by(4), "temperature 1": drawn_by(16)}
-    monkeypatch.setattr(continuations, "methods", lambda bundle, samples: known)
+    monkeypatch.setattr(continuations, "methods", lambda bundle, samples, weights: known)
     document, figures = measure.measure_pictures(
         Clips(frames, torch.tensor([10.0, 30]), ["a", "b"]), np.empty(0), BUNDLE
     )

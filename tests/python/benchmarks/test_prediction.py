@@ -42,7 +42,7 @@ def test_means_are_over_the_clips_of_a_set():
 
 def test_folders_without_clips_give_none(tmp_path):
     assert prediction.real_films(tmp_path, prediction.SIZE_PX, quick=True) == []
-    assert prediction.pushing_films(tmp_path / "none", 3) == []
+    assert prediction.clip_films(tmp_path / "none", 3) == []
 
 
 def test_a_program_that_was_not_built_is_told(monkeypatch, tmp_path):

@@ -1,5 +1,7 @@
 """The autoencoder has the paper's size, learns, revives entries and resumes to the same numbers."""
 
+import dataclasses
+
 import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed: scripts/make-venv.sh train,dev")
@@ -40,6 +42,15 @@ def test_frames_become_16_by_16_places_and_frames_again(size):
     assert codes.shape == (2, 4, 16, 16)
     assert 0 <= codes.min() <= codes.max() < 512
     assert net.decode(codes).shape == (2, 64, 64, 3)
+
+
+def test_a_frame_of_8_by_8_places_is_as_large_and_other_numbers_are_refused():
+    net = Autoencoder(dataclasses.replace(SMALL, side=8)).eval()
+    codes = net.encode(torch.zeros(1, 64, 64, 3, dtype=torch.uint8))
+    assert codes.shape == (1, 2, 8, 8)
+    assert net.decode(codes).shape == (1, 64, 64, 3)
+    with pytest.raises(ValueError, match="not 12"):
+        Autoencoder(dataclasses.replace(SMALL, side=12))
 
 
 def test_the_nearest_entry_is_taken_and_the_lowest_of_equals():

@@ -27,7 +27,7 @@ ALLOWED = {
     "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
     "export.solids": {"export.camera", "export.jobs", "export.photos"},
-    "export.clips": {"export.camera", "export.jobs", "export.places"},
+    "export.clips": {"export.camera", "export.jobs", "export.people", "export.places"},
     "export.densepose": {
         "export.bundle", "export.onnx_graphs", "export.shards", "export.surface", "export.surface_grid",
         "export.training",

@@ -133,9 +133,10 @@ def real_films(folder: Path, size_px: tuple[int, int], quick: bool) -> list[Film
     return films
 
 
-def read_film(path: Path, step: int, size_px: tuple[int, int]) -> list[np.ndarray]:
+def read_film(path: Path, step: int, size_px: tuple[int, int], most: int = FRAMES) -> list[np.ndarray]:
+    """Every `step`-th frame of a file, BGR uint8, at most so many."""
     capture, frames, index = cv2.VideoCapture(str(path)), [], 0
-    while len(frames) < FRAMES:
+    while len(frames) < most:
         there, frame = capture.read()
         if not there:
             break

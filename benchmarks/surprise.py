@@ -3,6 +3,7 @@ frame takes.
 
     python -m benchmarks.surprise                       val clips of pushing, sdk/models/prediction-int8 (some minutes)
     python -m benchmarks.surprise --clips 4             fewer clips, to see that it runs
+    python -m benchmarks.surprise --real                parts of real clips at 320 x 240 instead
     python -m benchmarks.surprise --bundle .data/bundles/prediction-fp32
 
 Needs clips of `export.clips` (.data/clips/pushing/val) and the built library (`make build`). Levels, kinds of events
@@ -12,15 +13,22 @@ and their places are those of `export.prediction.evaluate_events`; of surprise t
 from __future__ import annotations
 
 import argparse
+from itertools import zip_longest
 from pathlib import Path
 
+import cv2
 import maquette
 import numpy as np
+import torch
 
-from benchmarks.prediction import BUNDLE, frames_a_second
+from benchmarks.prediction import BUNDLE, SIZE_PX, frames_a_second, read_film
+from export.clips.clip import FRAMES
 from export.clips.events import KINDS, with_event
 from export.prediction.data import Clips, read_clips
 from export.prediction.evaluate_events import Score, difference, flow_residual, measured
+
+_MOST_FRAMES = 300  # of a real clip
+_LEAST_FPS = 8.0  # of parts of real clips
 
 
 def sdk_surprise(bundle: Path, method: str = "auto") -> Score:
@@ -33,6 +41,26 @@ def sdk_surprise(bundle: Path, method: str = "auto") -> Score:
         return np.array(bits[1:])
 
     return score
+
+
+def real_parts(folder: Path, most: int | None) -> Clips:
+    """Parts of FRAMES frames of the real clips, 320 x 240, at their own rate and at a third of it; neighbours are of
+    different clips, so that a cut leads elsewhere. Raises SystemExit where there are none."""
+    films: list[list[tuple[np.ndarray, float, str]]] = []
+    for path in sorted(folder.glob("*.*")):
+        own = []
+        for step in (3, 1):
+            fps = cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FPS) / step
+            frames = read_film(path, step, SIZE_PX, _MOST_FRAMES) if fps >= _LEAST_FPS else []
+            starts = range(0, len(frames) - FRAMES + 1, FRAMES)
+            own += [(np.stack(frames[at : at + FRAMES])[..., ::-1], fps, f"{path.stem} {at}") for at in starts]
+        films.append(own)
+    rounds = [[part for part in several if part] for several in zip_longest(*films)]
+    turns = [part for several in rounds if len(several) > 1 for part in several][:most]
+    if not turns:
+        raise SystemExit(f"{folder} has no clips: python -m export.photos people")
+    rgb, fps, names = zip(*turns, strict=True)
+    return Clips(torch.from_numpy(np.ascontiguousarray(np.stack(rgb))), torch.tensor(fps), list(names))
 
 
 def cuts_found(clips: Clips, bundle: Path, seed: int) -> dict[str, tuple[int, int]]:
@@ -65,14 +93,20 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--sets", nargs="+", default=["pushing"], help="default %(default)s")
     parser.add_argument("--split", choices=("val", "test"), default="val")
+    parser.add_argument("--real", action="store_true")
+    parser.add_argument("--photos", type=Path, default=Path(".data/photos/clip"), help="folder of real clips")
+    parser.add_argument("--no-times", action="store_true", help="areas alone, on a busy machine")
     parser.add_argument("--clips", type=int, help="at most so many; default: all")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    for threads in (1, 2):
+    for threads in () if options.no_times else (1, 2):
         found = frames_a_second(options.bundle, threads)
         parts = ", ".join(f"{name} {value:.2f}" for name, value in found.items() if name != "frames_a_second")
         print(f"640 x 480, {threads} thread(s): {found['frames_a_second']:.0f} frames a second ({parts})", flush=True)
-    clips = read_clips(options.data, options.sets, options.split)
+    if options.real:
+        clips = real_parts(options.photos, options.clips)
+    else:
+        clips = read_clips(options.data, options.sets, options.split)
     if options.clips:
         clips = Clips(clips.frames[: options.clips], clips.fps[: options.clips], clips.names[: options.clips])
     cuts = cuts_found(clips, options.bundle, options.seed)

@@ -27,8 +27,8 @@ from export.clips.events import KINDS, with_event
 from export.prediction.data import Clips, read_clips
 from export.prediction.evaluate_events import Score, difference, flow_residual, measured
 
-_MOST_FRAMES = 300  # of a real clip
-_LEAST_FPS = 8.0  # of parts of real clips
+_MAX_FRAMES = 300  # of a real clip
+_MIN_FPS = 8.0  # of parts of real clips
 
 
 def sdk_surprise(bundle: Path, method: str = "auto") -> Score:
@@ -51,7 +51,7 @@ def real_parts(folder: Path, most: int | None) -> Clips:
         own = []
         for step in (3, 1):
             fps = cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FPS) / step
-            frames = read_film(path, step, SIZE_PX, _MOST_FRAMES) if fps >= _LEAST_FPS else []
+            frames = read_film(path, step, SIZE_PX, _MAX_FRAMES) if fps >= _MIN_FPS else []
             starts = range(0, len(frames) - FRAMES + 1, FRAMES)
             own += [(np.stack(frames[at : at + FRAMES])[..., ::-1], fps, f"{path.stem} {at}") for at in starts]
         films.append(own)

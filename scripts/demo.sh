@@ -26,8 +26,8 @@ printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 102
 "$maquette" head tests/media/photo.jpg --out "$out/head.glb" --texture 1024 --preview "$out/head_turning.mp4"
 
 # What the clip shows next, beside what it did show, and how surprising each of its frames is.
-printf '\n== maquette predict tests/media/clip.mp4 --from 15 --compare --out %s/next.mp4\n' "$out"
-"$maquette" predict tests/media/clip.mp4 --from 15 --compare --out "$out/next.mp4"
+printf '\n== maquette predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out %s/next.mp4\n' "$out"
+"$maquette" predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out "$out/next.mp4"
 printf '\n== maquette predict tests/media/clip.mp4 --surprise --out %s/surprise.mp4\n' "$out"
 "$maquette" predict tests/media/clip.mp4 --surprise --out "$out/surprise.mp4"
 

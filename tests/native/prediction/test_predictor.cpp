@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 
 #include "support/expect_error.h"
 #include "support/moving_texture.h"
+#include "support/peak_memory.h"
 
 namespace {
 
@@ -164,7 +166,7 @@ TEST(Predictor, WhileNothingMovesItIsTheLastFrame) {
         predictor.push(last);
       }
       expect_last(predictor, last);
-      expect_last(predictor, last, 3000000000);
+      expect_last(predictor, last, 100 * kFrame_ns);
     }
   }
 }
@@ -293,6 +295,28 @@ TEST(Predictor, EverySizeIsPredicted) {
       }
     }
   }
+}
+
+TEST(Predictor, TenThousandFramesRolledOutStayInRangeAndTakeNoMoreMemory) {
+  maq::Predictor predictor({MAQ_PREDICTION_AUTO, 1});
+  maq::Frame frame, next;
+  for (int i = 0; i < 8; ++i) {
+    frame = moving_texture::frame(MAQ_PIXEL_GREY8, 64, 48, i, 0.25 * i, i * kFrame_ns);
+    predictor.push(frame);
+  }
+  const std::vector<uint8_t> begin = pixels_of(frame);
+  const auto [darkest, brightest] = std::minmax_element(begin.begin(), begin.end());
+  const auto roll_out = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      predictor.predict(kFrame_ns, next);
+      predictor.push(next);
+    }
+  };
+  roll_out(200);
+  EXPECT_LT(peak_memory_growth_mib([&] { roll_out(9800); }), 1);
+  for (const uint8_t value : pixels_of(next)) EXPECT_TRUE(value >= *darkest && value <= *brightest) << int(value);
+  EXPECT_EQ(next.timestamp_ns, 10007 * kFrame_ns);
+  EXPECT_EQ(predictor.stats().resets, 0u) << "what was made up goes on as well";
 }
 
 TEST(Predictor, OneFrameIsTheLastAndNoneIsAStatus) {

@@ -1,0 +1,28 @@
+// Saves what a camera or a clip will show a while later, as long as it plays: coming video:clip.mp4 coming.png
+// [<seconds ahead>]. Never steer anything by such pictures.
+#include <cstdio>
+#include <cstdlib>
+#include <maquette/maquette.hpp>
+
+int main(int argc, char** argv) try {
+  if (argc < 3) {
+    std::fprintf(stderr, "usage: coming <source> <picture> [<seconds ahead>]\n");
+    return 2;
+  }
+  const double ahead_s = argc > 3 ? std::atof(argv[3]) : 0.1;
+  const maquette::Context context;
+  maquette::Pipeline pipeline(context, maquette::default_pipeline_config());
+  const maquette::Surprise surprise(context);
+  pipeline.set_prediction(maquette::Predictor(context), ahead_s, &surprise);
+  pipeline.set_source(argv[1]);
+  unsigned long long events = 0;
+  while (const auto result = pipeline.next()) {
+    result->predicted->save(argv[2]);  // with a mark in the file
+    events += result->is_event ? 1 : 0;
+  }
+  std::printf("%.0f ms ahead, %llu events\n", 1e3 * ahead_s, events);
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
+}

@@ -7,7 +7,7 @@
 
 #include "edges/curves/curve_extractor.h"
 #include "edges/measuring/boxes.h"
-#include "support/analytic_scenes.h"
+#include "support/samples/analytic_scenes.h"
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include "head/build/head_surface.h"
 #include "head/files/head_file.h"
 #include "head/render/head_renderer.h"
-#include "support/ball_mesh.h"
+#include "support/samples/ball_mesh.h"
 
 namespace {
 

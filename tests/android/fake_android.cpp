@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "support/fake_ndk_graphics.h"
+#include "support/fakes/fake_ndk_graphics.h"
 
 #define EXPORTED extern "C" __attribute__((visibility("default")))
 #define OF_FAKE(type, name) EXPORTED type JNICALL Java_dev_maquette_FakeAndroid_##name

@@ -6,8 +6,8 @@
 #include "image/files/android/android_images.h"
 #include "image/files/file_codecs.h"
 #include "image/files/image_file.h"
-#include "support/encoded_images.h"
 #include "support/expect_error.h"
+#include "support/samples/encoded_images.h"
 #include "support/temp_folder.h"
 
 extern "C" int fake_create_result, fake_decode_result, fake_compress_result, fake_decoders_alive;

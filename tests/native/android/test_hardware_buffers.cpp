@@ -8,7 +8,7 @@
 
 #include "graphics/hardware_buffer.h"
 #include "status_error.h"
-#include "support/fake_ndk_graphics.h"
+#include "support/fakes/fake_ndk_graphics.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 
 #include "graphics/preview.h"
 #include "status_error.h"
-#include "support/fake_ndk_graphics.h"
+#include "support/fakes/fake_ndk_graphics.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "support/bundle_copy.h"
+#include "support/samples/bundle_copy.h"
 
 namespace {
 

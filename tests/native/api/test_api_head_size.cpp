@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "support/round_heads.h"
+#include "support/samples/round_heads.h"
 #include "support/temp_folder.h"
 
 namespace api_head_size_tests {

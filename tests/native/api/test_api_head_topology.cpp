@@ -4,7 +4,7 @@
 #include <cstring>
 #include <maquette/maquette.hpp>
 
-#include "support/round_heads.h"
+#include "support/samples/round_heads.h"
 #include "support/temp_folder.h"
 
 namespace api_head_topology_tests {

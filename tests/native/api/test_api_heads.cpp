@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "support/file_size_limit.h"
-#include "support/round_heads.h"
+#include "support/samples/round_heads.h"
 #include "support/temp_folder.h"
 
 namespace api_heads_tests {

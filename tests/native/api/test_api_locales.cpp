@@ -10,7 +10,7 @@
 #include <sstream>
 #include <string>
 
-#include "support/api_tiny_scene.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "support/api_tiny_scene.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <thread>
 
-#include "support/bundle_copy.h"
 #include "support/picture_files.h"
+#include "support/samples/bundle_copy.h"
 
 namespace {
 

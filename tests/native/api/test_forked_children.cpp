@@ -3,8 +3,8 @@
 
 #include <maquette/maquette.hpp>
 
-#include "support/api_tiny_scene.h"
 #include "support/child_process.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include <climits>
 #include <maquette/maquette.hpp>
 
-#include "support/api_tiny_scene.h"
 #include "support/child_process.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

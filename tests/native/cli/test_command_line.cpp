@@ -6,8 +6,8 @@
 #include <opencv2/videoio.hpp>
 #include <set>
 
-#include "support/bundle_copy.h"
 #include "support/program_run.h"
+#include "support/samples/bundle_copy.h"
 
 namespace {
 

@@ -7,9 +7,9 @@
 
 #include "densepose/densepose.h"
 #include "nn/sha256.h"
-#include "support/bundle_copy.h"
 #include "support/expect_error.h"
-#include "support/tiny_people.h"
+#include "support/samples/bundle_copy.h"
+#include "support/samples/tiny_people.h"
 
 namespace {
 

@@ -4,8 +4,8 @@
 
 #include "densepose/densepose.h"
 #include "densepose/manifest.h"
-#include "support/bundle_copy.h"
 #include "support/expect_error.h"
+#include "support/samples/bundle_copy.h"
 
 namespace {
 

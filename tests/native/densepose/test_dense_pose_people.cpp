@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "densepose/densepose.h"
-#include "support/tiny_people.h"
+#include "support/samples/tiny_people.h"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "densepose/densepose.h"
-#include "support/fake_provider_onnxruntime.h"
+#include "support/fakes/fake_provider_onnxruntime.h"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "edges/curves/curve_extractor.h"
-#include "support/analytic_scenes.h"
 #include "support/expect_error.h"
+#include "support/samples/analytic_scenes.h"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include "edges/curves/curve_extractor.h"
 #include "edges/fusion/curve_fusion.h"
-#include "support/analytic_scenes.h"
+#include "support/samples/analytic_scenes.h"
 
 namespace {
 

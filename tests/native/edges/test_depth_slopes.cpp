@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "support/tiny_edges.h"
+#include "support/samples/tiny_edges.h"
 
 namespace {
 

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/expect_error.h"
-#include "support/tiny_edges.h"
+#include "support/samples/tiny_edges.h"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "support/expect_error.h"
-#include "support/tiny_edges.h"
+#include "support/samples/tiny_edges.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "support/tiny_edges.h"
+#include "support/samples/tiny_edges.h"
 
 namespace {
 

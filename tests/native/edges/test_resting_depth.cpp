@@ -8,7 +8,7 @@
 #include <random>
 
 #include "edges/edges.h"
-#include "support/tiny_edges.h"
+#include "support/samples/tiny_edges.h"
 
 namespace resting_depth {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "edges/curves/curve_extractor.h"
 #include "edges/measuring/snap.h"
-#include "support/analytic_scenes.h"
+#include "support/samples/analytic_scenes.h"
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "head/build/head_builder.h"
 #include "head/build/head_surface.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace shipped_heads {
 

@@ -7,7 +7,7 @@
 #include "head/field/field_engine.h"
 #include "head/files/prior_file.h"
 #include "head/reference_field.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace field_parity {
 namespace {

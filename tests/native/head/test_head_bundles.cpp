@@ -5,7 +5,7 @@
 
 #include "nn/sha256.h"
 #include "support/expect_error.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace head_bundles {
 namespace {

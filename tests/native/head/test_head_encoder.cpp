@@ -6,7 +6,7 @@
 
 #include "maquette/types.h"
 #include "support/expect_error.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace head_encoder {
 namespace {

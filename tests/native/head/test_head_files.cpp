@@ -12,8 +12,8 @@
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
 #include "support/peak_memory.h"
+#include "support/samples/tiny_head.h"
 #include "support/temp_folder.h"
-#include "support/tiny_head.h"
 
 namespace head_files {
 namespace {

@@ -8,7 +8,7 @@
 #include "support/checked_file_damage.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace prior_files {
 namespace {

@@ -3,11 +3,12 @@
 
 #include <cmath>
 
+#include "head/files/file_format.h"
 #include "head/files/template_file.h"
 #include "support/checked_file_damage.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "support/tiny_head.h"
+#include "support/samples/tiny_head.h"
 
 namespace template_files {
 namespace {

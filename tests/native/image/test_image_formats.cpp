@@ -9,8 +9,8 @@
 #include "image/files/image_file.h"
 #include "image/files/image_header.h"
 #include "image/files/jpeg.h"
-#include "support/encoded_images.h"
 #include "support/expect_error.h"
+#include "support/samples/encoded_images.h"
 
 namespace {
 

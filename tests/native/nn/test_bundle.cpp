@@ -4,8 +4,8 @@
 #include "nn/bundle.h"
 #include "nn/session.h"
 #include "nn/sha256.h"
-#include "support/bundle_copy.h"
 #include "support/expect_error.h"
+#include "support/samples/bundle_copy.h"
 
 namespace {
 

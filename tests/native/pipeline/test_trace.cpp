@@ -4,7 +4,7 @@
 #include <maquette/maquette.hpp>
 #include <string>
 
-#include "support/fake_trace.h"
+#include "support/fakes/fake_trace.h"
 
 namespace {
 

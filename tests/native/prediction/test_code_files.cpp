@@ -5,7 +5,7 @@
 
 #include "support/checked_file_damage.h"
 #include "support/expect_error.h"
-#include "support/tiny_prediction.h"
+#include "support/samples/tiny_prediction.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "prediction/transformer/code_likelihood.h"
-#include "support/tiny_transformer.h"
+#include "support/samples/tiny_transformer.h"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "support/expect_error.h"
-#include "support/tiny_prediction.h"
+#include "support/samples/tiny_prediction.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include "image/convert.h"
 #include "prediction/networks/network_predictor.h"
 #include "support/expect_error.h"
-#include "support/moving_texture.h"
-#include "support/tiny_transformer.h"
+#include "support/samples/moving_texture.h"
+#include "support/samples/tiny_transformer.h"
 
 namespace {
 

@@ -8,8 +8,8 @@
 #include <random>
 
 #include "support/expect_error.h"
-#include "support/moving_texture.h"
 #include "support/peak_memory.h"
+#include "support/samples/moving_texture.h"
 
 namespace {
 

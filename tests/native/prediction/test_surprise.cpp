@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "support/expect_error.h"
-#include "support/moving_texture.h"
-#include "support/tiny_prediction.h"
-#include "support/tiny_transformer.h"
+#include "support/samples/moving_texture.h"
+#include "support/samples/tiny_prediction.h"
+#include "support/samples/tiny_transformer.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "support/checked_file_damage.h"
 #include "support/expect_error.h"
-#include "support/tiny_transformer.h"
+#include "support/samples/tiny_transformer.h"
 
 namespace {
 

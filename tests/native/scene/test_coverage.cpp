@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "scene/format/scene_packing.h"
-#include "support/synthetic_scene.h"
+#include "support/samples/synthetic_scene.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include "scene/build/descriptor_fitter.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
-#include "support/tiny_scene.h"
+#include "support/samples/tiny_scene.h"
 
 namespace {
 

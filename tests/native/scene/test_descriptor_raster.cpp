@@ -5,7 +5,7 @@
 
 #include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
-#include "support/synthetic_scene.h"
+#include "support/samples/synthetic_scene.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 
 #include "scene/gravity_alignment.h"
 #include "support/expect_error.h"
-#include "support/synthetic_scene.h"
+#include "support/samples/synthetic_scene.h"
 
 namespace {
 

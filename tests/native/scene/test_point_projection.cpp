@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "support/front_points.h"
-#include "support/synthetic_scene.h"
+#include "support/samples/front_points.h"
+#include "support/samples/synthetic_scene.h"
 
 namespace {
 

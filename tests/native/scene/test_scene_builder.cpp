@@ -7,7 +7,7 @@
 
 #include "scene/capture/posed_photo.h"
 #include "support/expect_error.h"
-#include "support/tiny_scene.h"
+#include "support/samples/tiny_scene.h"
 
 namespace {
 

@@ -15,7 +15,7 @@
 #include "scene/format/scene_packing.h"
 #include "scene/point_cloud.h"
 #include "support/expect_error.h"
-#include "support/fitted_scene.h"
+#include "support/samples/fitted_scene.h"
 #include "support/temp_folder.h"
 
 namespace {

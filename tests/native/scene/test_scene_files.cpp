@@ -15,8 +15,8 @@
 #include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
 #include "support/file_size_limit.h"
-#include "support/fitted_scene.h"
 #include "support/peak_memory.h"
+#include "support/samples/fitted_scene.h"
 #include "support/temp_folder.h"
 
 namespace {

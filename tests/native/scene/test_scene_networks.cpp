@@ -6,7 +6,7 @@
 
 #include "nn/sha256.h"
 #include "support/expect_error.h"
-#include "support/tiny_scene.h"
+#include "support/samples/tiny_scene.h"
 
 namespace {
 

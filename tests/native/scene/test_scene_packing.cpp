@@ -12,8 +12,8 @@
 #include "scene/format/block_codec.h"
 #include "scene/point_cloud.h"
 #include "support/expect_error.h"
-#include "support/fitted_scene.h"
 #include "support/peak_memory.h"
+#include "support/samples/fitted_scene.h"
 
 namespace {
 

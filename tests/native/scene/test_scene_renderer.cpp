@@ -8,8 +8,8 @@
 #include "image/files/image_file.h"
 #include "scene/format/scene_packing.h"
 #include "support/expect_error.h"
-#include "support/synthetic_scene.h"
-#include "support/tiny_scene.h"
+#include "support/samples/synthetic_scene.h"
+#include "support/samples/tiny_scene.h"
 
 namespace {
 

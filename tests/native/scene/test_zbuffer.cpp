@@ -4,8 +4,8 @@
 #include "scene/format/scene_packing.h"
 #include "scene/visibility/view_frustum.h"
 #include "scene/visibility/z_buffer.h"
-#include "support/front_points.h"
-#include "support/synthetic_scene.h"
+#include "support/samples/front_points.h"
+#include "support/samples/synthetic_scene.h"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include "sources/depthai/depthai_camera.h"
 #include "sources/live_source.h"
 #include "support/expect_error.h"
-#include "support/fake_depthai.h"
+#include "support/fakes/fake_depthai.h"
 #include "support/state_reports.h"
 #include "support/wait_until.h"
 

@@ -4,8 +4,8 @@
 
 #include "sources/registry.h"
 #include "support/expect_error.h"
+#include "support/samples/variable_rate_clip.h"
 #include "support/temp_folder.h"
-#include "support/variable_rate_clip.h"
 
 namespace {
 

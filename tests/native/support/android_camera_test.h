@@ -11,7 +11,7 @@
 
 #include "sources/android/camera2_camera.h"
 #include "sources/live_source.h"
-#include "support/fake_camera2.h"
+#include "support/fakes/fake_camera2.h"
 #include "support/state_reports.h"
 #include "support/wait_until.h"
 

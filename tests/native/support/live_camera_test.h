@@ -13,7 +13,7 @@
 #include "sources/live_source.h"
 #include "sources/v4l2/v4l2_camera.h"
 #include "support/expect_error.h"
-#include "support/fake_v4l2.h"
+#include "support/fakes/fake_v4l2.h"
 #include "support/source_threads.h"
 #include "support/state_reports.h"
 #include "support/wait_until.h"

@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "core/module.h"
-#include "support/fake_depthai.h"
+#include "support/fakes/fake_depthai.h"
 
 namespace {
 

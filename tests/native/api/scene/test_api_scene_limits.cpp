@@ -1,8 +1,8 @@
 // As many points as nobody should have, through the C API: memory stays bounded.
 #include <gtest/gtest.h>
 
-#include "support/api_tiny_scene.h"
 #include "support/peak_memory.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

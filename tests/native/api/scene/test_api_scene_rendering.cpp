@@ -7,7 +7,7 @@
 #include <optional>
 #include <thread>
 
-#include "support/api_tiny_scene.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // What the C API for scenes does with NULL and with structs of unknown size: a status and a sentence, never a crash.
 #include <gtest/gtest.h>
 
-#include "support/api_tiny_scene.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

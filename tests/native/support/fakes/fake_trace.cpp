@@ -1,5 +1,5 @@
 // The tracing functions of libandroid.so, which write down the sections.
-#include "support/fake_trace.h"
+#include "support/fakes/fake_trace.h"
 
 #include <atomic>
 #include <mutex>

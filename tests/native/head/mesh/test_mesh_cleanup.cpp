@@ -5,7 +5,7 @@
 
 #include "head/mesh/marching_cubes.h"
 #include "head/mesh/mesh_cleanup.h"
-#include "support/closed_mesh.h"
+#include "support/samples/closed_mesh.h"
 
 namespace {
 

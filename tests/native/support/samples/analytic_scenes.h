@@ -1,7 +1,7 @@
 // The scenes that curves are judged on, about a metre large, as their camera sees them.
 #pragma once
 
-#include "support/analytic_solids.h"
+#include "support/samples/analytic_solids.h"
 
 namespace maq::test {
 

@@ -5,8 +5,8 @@
 #include <cstring>
 
 #include "head/build/head_surface.h"
-#include "support/closed_mesh.h"
 #include "support/expect_error.h"
+#include "support/samples/closed_mesh.h"
 
 namespace head_surface_tests {
 namespace {

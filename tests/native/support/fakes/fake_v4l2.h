@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "sources/v4l2/system_calls.h"
-#include "support/fake_v4l2_controls.h"
+#include "support/fakes/fake_v4l2_controls.h"
 
 class FakeV4l2 : public maq::SystemCalls {
  public:

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "prediction/transformer/code_transformer.h"
-#include "support/tiny_prediction.h"
+#include "support/samples/tiny_prediction.h"
 
 namespace tiny_transformer {
 

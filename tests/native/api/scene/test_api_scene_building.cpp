@@ -5,7 +5,7 @@
 #include <limits>
 #include <thread>
 
-#include "support/api_tiny_scene.h"
+#include "support/samples/api_tiny_scene.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <limits>
 #include <thread>
 
-#include "support/ball_mesh.h"
 #include "support/expect_error.h"
+#include "support/samples/ball_mesh.h"
 
 namespace head_renderer_tests {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "head/mesh/mesh_raster.h"
-#include "support/ball_mesh.h"
 #include "support/expect_error.h"
+#include "support/samples/ball_mesh.h"
 
 namespace {
 

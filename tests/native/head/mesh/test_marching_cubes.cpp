@@ -7,8 +7,8 @@
 
 #include "head/mesh/cube_triangles.h"
 #include "head/mesh/marching_cubes.h"
-#include "support/closed_mesh.h"
 #include "support/expect_error.h"
+#include "support/samples/closed_mesh.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "support/fake_provider_onnxruntime.h"
+#include "support/fakes/fake_provider_onnxruntime.h"
 
 #include <dlfcn.h>
 #include <onnxruntime_c_api.h>

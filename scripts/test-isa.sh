@@ -3,10 +3,11 @@
 #
 #   scripts/test-isa.sh [JOBS] [core]
 #
-# Builds for aarch64, runs the native tests there, and compares the labels and the edges of the shipped bundles on x86-64
-# with AVX2 but without VNNI, and on aarch64 with and without dot product, with those on this processor. Needs
-# build/release. core: aarch64 only, the tests of files, images and dense pose, labels and edges; when they have passed
-# with the same sources, compiler and emulator on this machine before, in whatever checkout, that result counts.
+# Builds for aarch64, runs the native tests there, and compares the labels, the edges and the prediction of the shipped
+# bundles on x86-64 with AVX2 but without VNNI, and on aarch64 with and without dot product, with those on this
+# processor. Needs build/release. core: aarch64 only, the tests of files, images and dense pose, labels and edges; when
+# they have passed with the same sources, compiler and emulator on this machine before, in whatever checkout, that
+# result counts.
 # Exit status 77: it could not be run, and the last line says why.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,10 +24,10 @@ not_run() {
 }
 
 case "$jobs" in
-    -h | --help) sed -n '2,11s/^# \{0,1\}//p' "$0"; exit 0 ;;
-    '' | *[!0-9]*) sed -n '2,11s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+    -h | --help) sed -n '2,12s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    '' | *[!0-9]*) sed -n '2,12s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
 esac
-case "$part" in all | core) ;; *) sed -n '2,11s/^# \{0,1\}//p' "$0" >&2; exit 2 ;; esac
+case "$part" in all | core) ;; *) sed -n '2,12s/^# \{0,1\}//p' "$0" >&2; exit 2 ;; esac
 [ "$(uname -m)" = x86_64 ] || not_run "it emulates other processors from x86-64, and this is $(uname -m)"
 [ -x build/release/stage/bin/maquette ] || not_run "the release build is missing (make build)"
 scripts/install-packages.sh isa || not_run "qemu-user, g++-aarch64-linux-gnu or maven could not be installed"
@@ -80,8 +81,8 @@ echo "Left out: programs of users, which this machine's compiler builds, and wha
 ctest --test-dir build/aarch64 -j "$jobs" --output-on-failure --no-tests=error \
     --output-junit "$PWD/$results/isa-ctest-aarch64.xml" || status=1
 
-printf '\n== labels and edges on other processors (emulated: some minutes)\n'
-for what in label field; do
+printf '\n== labels, edges and prediction on other processors (emulated: some minutes)\n'
+for what in label field prediction; do
     .venv/bin/python -m "benchmarks.processors.${what}_agreement" --jobs "$jobs" --junit "$results/isa-$what.xml" || status=1
 done
 exit $status

@@ -120,13 +120,14 @@ def compared(
     return {processor.title: found[processor.title] for processor in others}
 
 
-def run_maquette(processor: Processor, arguments: Sequence[str]) -> None:
-    """Runs the command line of a processor's build. Raises ValueError with what went wrong."""
+def run_maquette(processor: Processor, arguments: Sequence[str]) -> str:
+    """Runs the command line of a processor's build and returns its output. Raises ValueError with what went wrong."""
     done = subprocess.run([*processor.command("stage/bin/maquette"), *arguments], capture_output=True, text=True)
     if done.returncode:
         raise ValueError(
             f"{processor.title}: maquette {arguments[0]} failed ({done.returncode}).\n{done.stderr.strip()}"
         )
+    return done.stdout
 
 
 def write_junit(path: Path, suite_name: str, failures: Mapping[str, str | None]) -> None:

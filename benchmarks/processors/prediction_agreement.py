@@ -1,0 +1,132 @@
+"""Compares the surprise and the likeliest coming frames of this processor with those on others, which qemu emulates.
+
+Bits of the first frames of a stream, and pictures that the shipped networks draw at temperature 0, on x86-64 with AVX2
+but without VNNI, and on aarch64 without and with the dot product and matrix instructions. Needs both builds and
+Debian's qemu-user; `make test-isa` makes them and runs this.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.processors.emulated import ROOT, Processor, add_arguments, compared, run_maquette, write_junit
+
+SOURCE = "stub:people?count=2&seed=3&size=64x64&frames=8"
+FROM, DRAWN = 5, 2  # the last frame that is seen, and frames that are drawn after it
+CELLS = 16  # of a frame of codes, a side
+MAX_LEVELS = 1  # in which pixels of a cell of equal codes may differ
+BAR = 0.99  # of cells
+MAX_BITS = 0.01  # of the bits of a frame, as a fraction
+
+
+@dataclass(frozen=True)
+class PredictionAgreement:
+    """How far two folders of results agree."""
+
+    frames: int  # whose surprise was compared
+    worst_bits: float  # difference by the bits here, of the frame where it is largest
+    same_events: bool
+    same_cells: float  # fraction of cells that were drawn the same
+
+    def passes(self, bar: float) -> bool:
+        return self.same_cells >= bar and self.worst_bits <= MAX_BITS and self.same_events
+
+
+def read_surprise(folder: Path) -> list[dict]:
+    return [json.loads(line) for line in (folder / "surprise.json").read_text().splitlines()]
+
+
+def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Of two pictures uint8 [H, W, 3], whose sides are multiples of CELLS: bool [CELLS, CELLS]."""
+    worst = np.abs(one.astype(int) - other.astype(int)).max(-1)
+    height, width = worst.shape
+    return worst.reshape(CELLS, height // CELLS, CELLS, width // CELLS).max((1, 3)) <= MAX_LEVELS
+
+
+def compare(reference: Path, other: Path) -> PredictionAgreement:
+    """Compares two folders of results. Raises ValueError when they are not of the same frames, or of none."""
+    ours, theirs = read_surprise(reference), read_surprise(other)
+    names, others = (sorted(path.name for path in folder.glob("*.png")) for folder in (reference, other))
+    if not ours or not names or len(ours) != len(theirs) or names != others:
+        raise ValueError(
+            f"{reference} has {len(ours)} frames and {len(names)} pictures, {other} {len(theirs)} and {len(others)}."
+        )
+    differences = [abs(a["bits"] - b["bits"]) / a["bits"] for a, b in zip(ours, theirs, strict=True)]
+    flags = [[frame[name] for frame in found for name in ("event", "cut", "start")] for found in (ours, theirs)]
+    cells = [same_cells(*(cv2.imread(str(folder / name)) for folder in (reference, other))) for name in names]
+    return PredictionAgreement(len(ours), max(differences), flags[0] == flags[1], float(np.mean(cells)))
+
+
+def run(processor: Processor, bundle: Path, out: Path) -> None:
+    """Writes surprise and drawn frames into `out`, emptied first. Raises ValueError with what went wrong."""
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    settings = ["--bundle", str(bundle), "--threads", "1"]
+    (out / "surprise.json").write_text(run_maquette(processor, ["predict", SOURCE, "--surprise", "--json", *settings]))
+    drawn = ["--samples", "1", "--temperature", "0", "--from", str(FROM), "--frames", str(DRAWN), "--out", str(out)]
+    run_maquette(processor, ["predict", SOURCE, *drawn, *settings])
+
+
+def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar: float) -> None:
+    table = Table(title=f"Prediction by {bundle.name} against that on this processor", title_justify="left")
+    table.add_column("processor", no_wrap=True)
+    for column in ("frames", "bits, worst, %", "events", "cells drawn alike, %", "bar"):
+        table.add_column(column, justify="right")
+    for name, found in results.items():
+        if isinstance(found, str):
+            table.add_row(name, *["-"] * 4, "failed")
+            continue
+        events = "the same" if found.same_events else "others"
+        figures = (str(found.frames), f"{100 * found.worst_bits:.3f}", events, f"{100 * found.same_cells:.2f}")
+        table.add_row(name, *figures, "held" if found.passes(bar) else "missed")
+    Console(width=110).print(table)
+
+
+def failure_of(found: PredictionAgreement | str, bar: float) -> str | None:
+    """What is wrong, as a sentence; None if nothing is."""
+    if isinstance(found, str) or found.passes(bar):
+        return found if isinstance(found, str) else None
+    return (
+        f"{100 * found.same_cells:.2f} % of the cells are drawn alike, where {100 * bar:g} % are asked for; bits "
+        f"differ by up to {100 * found.worst_bits:.3f} %, where {100 * MAX_BITS:g} % are allowed; events are "
+        f"{'the same' if found.same_events else 'others'}."
+    )
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.processors.prediction_agreement",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--bundle", type=Path, default=ROOT / "sdk/models/prediction-int8")
+    parser.add_argument(
+        "--bar", type=float, default=BAR, help="min. fraction of cells that are drawn alike (default %(default)s)"
+    )
+    add_arguments(parser, ROOT / "build/prediction-agreement")
+    options = parser.parse_args(argv)
+    try:
+        results = compared(options, lambda processor, out: run(processor, options.bundle, out), compare)
+    except (ValueError, OSError, subprocess.CalledProcessError) as error:
+        print(f"prediction_agreement: {error}", file=sys.stderr)
+        return 1
+    print_table(options.bundle, results, options.bar)
+    failures = {title: failure_of(found, options.bar) for title, found in results.items()}
+    if options.junit:
+        write_junit(options.junit, "prediction_agreement", failures)
+    return 1 if any(failures.values()) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from benchmarks.drawn import frechet, times, uncertainty
-from benchmarks.drawn.continuations import GIVEN, MADE, SAMPLES, went_on
+from benchmarks.drawn.continuations import CONVOLUTIONAL, GIVEN, MADE, SAMPLES, went_on
 from benchmarks.prediction import SIZE_PX, real_films
 from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
@@ -34,8 +34,11 @@ def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str,
         for count in [count for count in (4, 8, SAMPLES) if count <= own.shape[1]]:
             found[f"{name}, mean of {count}"] = psnr(own[:, :count].mean(1, dtype=np.float32), truth)
             found[f"{name}, best of {count}"] = of_each[:, :count].max(1)
-    half = 0.5 * (pictures["temperature 1"].mean(1, dtype=np.float32) + pictures["auto"][:, 0])
-    found[f"mean of auto and of {samples}"] = psnr(half, truth)
+    halves = {f"of {samples}": pictures["temperature 1"].mean(1, dtype=np.float32)}
+    if CONVOLUTIONAL in pictures:
+        halves[CONVOLUTIONAL] = pictures[CONVOLUTIONAL][:, 0].astype(np.float32)
+    for name, own in halves.items():
+        found[f"mean of auto and {name}"] = psnr(0.5 * (own + pictures["auto"][:, 0]), truth)
     return found
 
 
@@ -109,11 +112,12 @@ def measure_pictures(
     decibels = pictures_db(pictures, truth)
     document: dict = {"clips": len(clips), "given": GIVEN, "made": MADE, "ahead": list(AHEAD)}
     document |= {"psnr_db": {}, "rank": {}, "reliability": {}}
+    better = np.maximum(decibels["last frame"].mean(0), decibels["motion"].mean(0))
+    gained = {name: float((own.mean(0) - better)[FAR].mean()) for name, own in decibels.items()}
+    document["gain_db"] = gained
     for name, own in decibels.items():
         document["psnr_db"][name] = [float(own[:, k - 1].mean()) for k in AHEAD]
-    better = np.maximum(decibels["last frame"].mean(0), decibels["motion"].mean(0))
-    most = f"temperature 1, mean of {min(samples, 8)}"
-    figures = {"drawn_mean_gain_db": float((decibels[most].mean(0) - better)[FAR].mean())}
+    figures = {"drawn_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"]}
     for name, (uncertain, errors) in uncertainties(clips, pictures, bits).items():
         each = uncertainty.by_frame(uncertain, errors)
         document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]

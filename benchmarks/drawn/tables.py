@@ -31,6 +31,9 @@ def drawn_tables(document: dict) -> list[str | Table]:
             ["", *ratios], {name: [own[name] for own in ratios.values()] for name in next(iter(ratios.values()))}, 2
         ),
     ]
+    if "gain_db" in document:  # a report measured before has none
+        parts.append("Mean gain 5 to 11 frames ahead over the better of the last frame and motion, dB.")
+        parts.append(_table(["", "dB"], {name: [own] for name, own in document["gain_db"].items()}, 2))
     if "times_ms" in document:
         parts.append("Times of draws, ms.")
         parts.append(_table(["", "ms"], {name: [own] for name, own in document["times_ms"].items()}, 1))

@@ -146,4 +146,5 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
     assert document["frechet"]["frames"]["last frame"] == 1
     text = "\n".join(part if isinstance(part, str) else str(part) for part in drawn_tables(document))
     assert "of 2 clips" in text
+    assert document["gain_db"]["last frame"] == 0  # all three without networks are the last frame here
     assert "'temperature 1, best of 16'" in text

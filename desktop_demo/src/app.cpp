@@ -48,7 +48,7 @@ int App::run() {
     const bool is_done = options_.headless && view_->act_alone();
     if (is_done) last = window_.read_pixels(window_.rect());
     window_.show();
-    times_.add_frame(begin_s);
+    times_.add(begin_s, monotonic_s());
     if (is_done) window_.close();
   }
   window_.hide();  // before it waits for the threads
@@ -214,7 +214,10 @@ int App::report(const maquette::RgbaImage& screenshot) {
   const Rect all = window_.in_pixels(window_.rect());
   json["window_px"] = {all.width, all.height};
   json["opengl"] = window_.opengl();
-  json["ui"] = times_.report();
+  json["ui"] = {{"frames", times_.count()},
+                {"longest_ms", times_.percentile_ms(100)},
+                {"p99_ms", times_.percentile_ms(99)},
+                {"start_ms", times_.start_ms()}};
   const std::string failure = view_->failure();
   std::puts(json.dump().c_str());
   if (!failure.empty()) std::fprintf(stderr, "maquette-demo: %s\n", failure.c_str());

@@ -1,6 +1,7 @@
 // Brings window, views, panel and saver together: routes what the user does, and draws one frame after the other.
 #pragma once
 
+#include <app/frame_times.h>
 #include <app/saver.h>
 #include <app/triple_buffer.h>
 #include <string>
@@ -14,7 +15,6 @@
 #include "scene_view.h"
 #include "screen/painter.h"
 #include "screen/window.h"
-#include "ui_times.h"
 
 class App {
  public:
@@ -35,7 +35,7 @@ class App {
   int report(const maquette::RgbaImage& screenshot);
 
   const Options& options_;
-  UiTimes times_;
+  maquette::FrameTimes times_{monotonic_s()};
   maquette::Context context_;
   Window window_;
   Painter painter_;

@@ -1,13 +1,11 @@
 #include "next_view.h"
 
 #include <GLFW/glfw3.h>
+#include <app/tiling.h>
 #include <imgui.h>
-#include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 
-#include "drawing/red_cells.h"
 #include "drawing/surprise_drawing.h"
 
 namespace {
@@ -17,30 +15,8 @@ constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:peop
 constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait"};
 constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // of what drags and arrows turn elsewhere
-constexpr Reddening kUncertainRed = {1, 6, 0.6f};
-constexpr double kFreshMs = 500,
-                 kStaleMs = 2000;  // age of uncertainty from which on its red fades, and where none is left
+constexpr Reddening kSurpriseRed = {1, 8, 0.7f}, kUncertainRed = {1, 6, 0.6f};
 constexpr ImU32 kMadeUpColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
-
-std::string ahead_text(double ahead_s) { return "+" + std::to_string(std::lround(ahead_s * 1e3)) + " ms"; }
-
-std::string predicted_text(double ahead_s) { return "predicted " + ahead_text(ahead_s); }
-
-// What is old says little of the picture that it lies over.
-Reddening uncertain_red(double age_ms) {
-  Reddening red = kUncertainRed;
-  red.max_red *= float(std::clamp((kStaleMs - age_ms) / (kStaleMs - kFreshMs), 0.0, 1.0));
-  return red;
-}
-
-double mean_bits(const maquette::DrawnFuture& drawn) {
-  return std::accumulate(drawn.bits.begin(), drawn.bits.end(), 0.0) / double(std::max<size_t>(1, drawn.bits.size()));
-}
-
-std::string method_text(const maq_predictor_stats& stats) {
-  if (stats.method != MAQ_PREDICTION_AUTO) return kMethodNames[size_t(stats.method)];
-  return std::to_string(std::lround(100 * double(stats.motion_fraction))) + " % motion";
-}
 
 }  // namespace
 
@@ -61,17 +37,13 @@ NextView::NextView(const maquette::Context& context, const Options& options, con
 // Meanwhile others drew into the textures.
 void NextView::set_visible(bool is_visible) {
   LiveView::set_visible(is_visible);
-  if (is_visible && frame().number > 0) {
-    painter_.set_scene(frame().next, frame().now);
-    painter_.set_sample(frame().drawn.picture);
-  }
+  if (is_visible && frame().number > 0) painter_.set_scene(frame().next, frame().now, frame().drawn.picture);
 }
 
 bool NextView::update() {
   note_end();
   if (!frames_.take()) return false;
-  painter_.set_scene(frame().next, frame().now);
-  painter_.set_sample(frame().drawn.picture);
+  painter_.set_scene(frame().next, frame().now, frame().drawn.picture);
   const maq_predictor_stats& s = frame().stats;
   stages_.add({s.grey_ms, s.flow_ms, s.choice_ms, s.project_ms, s.fetch_ms, float(frame().waiting_ms)});
   return true;
@@ -98,24 +70,15 @@ void NextView::steer(const Steering& steering, const Rect&) {
 void NextView::place(Rect area) {
   const int curve_height = choice_.finds_surprise ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
   area.height -= curve_height;
-  const int pictures = choice_.draws_sample ? 3 : 2;
-  Rect one;
-  int columns = 0, rows = 0;
-  for (int tried = pictures; tried >= 1; --tried) {
-    const int tried_rows = (pictures + tried - 1) / tried;
-    const Rect fitting =
-        Rect{0, 0, area.width / tried, area.height / tried_rows}.fit(frame().now.width_px, frame().now.height_px);
-    if (columns != 0 && fitting.width <= one.width) continue;
-    one = fitting, columns = tried, rows = tried_rows;
-  }
-  const int all_width = columns * one.width, all_height = rows * one.height;
+  const maquette::Tiling one = maquette::tile(choice_.draws_sample ? 3 : 2, area.width, area.height,
+                                              frame().now.width_px, frame().now.height_px);
+  const int all_width = one.columns * one.width, all_height = one.rows * one.height;
   image_rect_ = {area.x + (area.width - all_width) / 2, area.y + (area.height - all_height) / 2, all_width, all_height};
-  const auto rect_of = [&](int picture) {
-    return Rect{image_rect_.x + picture % columns * one.width, image_rect_.y + picture / columns * one.height,
-                one.width, one.height};
-  };
-  now_rect_ = rect_of(0), next_rect_ = rect_of(1);
-  sample_rect_ = choice_.draws_sample ? rect_of(2) : Rect{};
+  Rect* const rects[] = {&now_rect_, &next_rect_, &sample_rect_};
+  for (int i = 0; i < 3; ++i) {
+    *rects[i] = {image_rect_.x + i % one.columns * one.width, image_rect_.y + i / one.columns * one.height, one.width,
+                 one.height};
+  }
   curve_rect_ = {image_rect_.x, image_rect_.y + all_height, all_width, curve_height};
   image_rect_.height += curve_height;
 }
@@ -127,25 +90,22 @@ void NextView::draw(const Rect& area) {
   painter_.draw_scene(next_rect_, 0);
   const bool is_bridged = frame().origin.kind == MAQ_FRAME_PREDICTED;
   if (choice_.finds_surprise && !frame().surprise.empty()) {
-    draw_surprising_cells(frame(), now_rect_);
+    const bool is_start = frame().surprise.back().score.is_start != 0;  // its bits are of another kind
+    if (!is_start) draw_red_cells(frame().surprise_bits, kSurpriseRed, now_rect_);
     draw_surprise_curve(frame().surprise, curve_rect_, window_.scale());
   }
-  mark(now_rect_, is_bridged, is_bridged ? predicted_text(double(frame().origin.horizon_ns) / 1e9) : "now");
-  const bool is_drawn = frame().drawn.number > 0;
-  if (choice_.finds_uncertainty && is_drawn) {
-    const auto columns = int(std::lround(std::sqrt(double(frame().drawn.bits.size()))));
-    draw_red_cells(frame().drawn.bits, columns, uncertain_red(frame().drawn_age_ms), next_rect_);
+  const std::string ahead_ms = std::to_string(frame().origin.horizon_ns / 1000000);
+  mark(now_rect_, is_bridged, is_bridged ? "predicted +" + ahead_ms + " ms" : "now");
+  if (choice_.finds_uncertainty) {
+    Reddening red = kUncertainRed;
+    red.max_red *= float(frame().drawn_freshness);
+    draw_red_cells(frame().drawn.bits, red, next_rect_);
   }
-  const std::string age =
-      choice_.finds_uncertainty ? is_drawn ? "; red: uncertain, " + age_text() : "; no uncertainty yet" : "";
-  mark(next_rect_, true, predicted_text(frame().made_ahead_s) + ", " + method_text(frame().stats) + age);
-  if (!choice_.draws_sample || !is_drawn || frame().drawn.picture.empty()) return;
-  painter_.draw_sample(sample_rect_);
-  mark(sample_rect_, true, "one that may come " + ahead_text(frame().drawn.ahead_s) + ", " + age_text());
+  mark(next_rect_, true, maquette::text_of_next(frame(), choice_.finds_uncertainty));
+  if (!choice_.draws_sample || frame().drawn.picture.empty()) return;
+  painter_.draw_scene(sample_rect_, Painter::kSample);
+  mark(sample_rect_, true, maquette::text_of_drawn(frame()));
 }
-
-// Of what was drawn by networks, which come after the picture.
-std::string NextView::age_text() const { return std::to_string(std::lround(frame().drawn_age_ms)) + " ms old"; }
 
 void NextView::mark(const Rect& rect, bool is_predicted, const std::string& text) const {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
@@ -181,21 +141,18 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
                         {"latest_gap_ms", frame().gaps.latest_gap_ms}};
   json["surprise"] = surprise_report(frame());
   const maquette::DrawnFuture& drawn = frame().drawn;
-  json["drawn"] = {{"number", drawn.number}};
-  if (drawn.number > 0) {
-    json["sample_px"] = window_.in_pixels(sample_rect_).numbers();
-    json["drawn"] = {
-        {"number", drawn.number},         {"ahead_ms", drawn.ahead_s * 1e3},
-        {"age_ms", frame().drawn_age_ms}, {"draw_ms", drawn.draw_ms},
-        {"bits", mean_bits(drawn)},       {"picture_px", {drawn.picture.width_px, drawn.picture.height_px}}};
-  }
+  json["sample_px"] = window_.in_pixels(sample_rect_).numbers();
+  json["drawn"] = {{"number", drawn.number},
+                   {"age_ms", frame().drawn_age_ms},
+                   {"bits", drawn.mean_bits},
+                   {"picture_px", {drawn.picture.width_px, drawn.picture.height_px}}};
 }
 
 Action NextView::draw_panel() {
   Action action = draw_source(frame().results_per_second);
   const maq_predictor_stats& stats = frame().stats;
   ImGui::Text("%d x %d, pushed in %.1f ms", frame().now.width_px, frame().now.height_px, double(stats.push_ms));
-  ImGui::Text("predicted in %.1f ms by %s", double(stats.predict_ms), method_text(stats).c_str());
+  ImGui::Text("predicted in %.1f ms by %s", double(stats.predict_ms), maquette::text_of_method(stats).c_str());
   stages_.draw(kPredictionStages, std::size(kPredictionStages), window_.scale());
   bool changed = false;
   float ahead_ms = float(choice_.ahead_s * 1e3);
@@ -242,6 +199,6 @@ bool NextView::draw_uncertainty() {
   changed |= ImGui::Checkbox("One that may come, drawn (D)", &choice_.draws_sample);
   const maquette::DrawnFuture& drawn = frame().drawn;
   if (drawn.number == 0) return changed;
-  ImGui::Text("%.2f bits a code, drawn in %.0f ms, %.0f ms ago", mean_bits(drawn), drawn.draw_ms, frame().drawn_age_ms);
+  ImGui::Text("%.2f bits a code, drawn in %.0f ms, %.0f ms ago", drawn.mean_bits, drawn.draw_ms, frame().drawn_age_ms);
   return changed;
 }

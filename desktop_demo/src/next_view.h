@@ -27,7 +27,6 @@ class NextView final : public LiveView {
   const maquette::PredictionFrame& frame() const { return frames_.front(); }
   void place(Rect area);
   void mark(const Rect& rect, bool is_predicted, const std::string& text) const;
-  std::string age_text() const;
   void draw_gaps();
   bool draw_uncertainty();
 

@@ -6,14 +6,11 @@
 #include <cstdio>
 #include <utility>
 
-#include "drawing/red_cells.h"
-
 namespace {
 
 using maquette::PredictionFrame;
 using maquette::SurpriseMoment;
 
-constexpr Reddening kSurpriseRed = {1, 8, 0.7f};
 constexpr double kMinBits = 0.03, kMaxBits = 12;  // of the curve
 constexpr size_t kMaxEventsListed = 5;
 constexpr ImU32 kEventColour = IM_COL32(230, 60, 60, 255);
@@ -26,10 +23,27 @@ float height_of(double bits) {
 
 }  // namespace
 
-void draw_surprising_cells(const PredictionFrame& frame, const Rect& picture) {
-  const maq_surprise_score& score = frame.surprise.back().score;
-  if (score.is_start != 0) return;  // its bits are of another kind
-  draw_red_cells(frame.surprise_bits, score.columns, kSurpriseRed, picture);
+void draw_red_cells(const std::vector<float>& bits, const Reddening& reddening, const Rect& picture) {
+  if (bits.empty()) return;
+  const int side = int(std::lround(std::sqrt(double(bits.size()))));
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto colour = [&](int row, int column) {
+    const float own = bits[size_t(std::clamp(row, 0, side - 1) * side + std::clamp(column, 0, side - 1))];
+    const float fullness = (own - reddening.from_bits) / (reddening.full_bits - reddening.from_bits);
+    return IM_COL32(255, 0, 0, int(255 * reddening.max_red * std::clamp(fullness, 0.0f, 1.0f)));
+  };
+  // A line of the grid: the borders of the picture, and between them the middles.
+  const auto at = [&](int i, int from, int length) {
+    return float(from) + std::clamp(float(i) - 0.5f, 0.0f, float(side)) * float(length) / float(side);
+  };
+  for (int row = 0; row <= side; ++row) {
+    const float top = at(row, picture.y, picture.height), bottom = at(row + 1, picture.y, picture.height);
+    for (int column = 0; column <= side; ++column) {
+      const float left = at(column, picture.x, picture.width), right = at(column + 1, picture.x, picture.width);
+      list->AddRectFilledMultiColor({left, top}, {right, bottom}, colour(row - 1, column - 1), colour(row - 1, column),
+                                    colour(row, column), colour(row, column - 1));
+    }
+  }
 }
 
 void draw_surprise_curve(const std::deque<SurpriseMoment>& moments, const Rect& rect, float scale) {

@@ -10,7 +10,7 @@
 namespace {
 
 // As the shaders call them, in the order of Painter::Texture.
-constexpr const char* kTextureNames[] = {"camera", "iuv", "outfit", "surface", "seen", "rendering", "photo", "sample"};
+constexpr const char* kTextureNames[] = {"camera", "iuv", "outfit", "surface", "seen", "rendering", "photo", "drawn"};
 
 // Each texture stays bound to a unit of its own; the first is Dear ImGui's.
 constexpr int kFirstUnit = 1;
@@ -107,12 +107,10 @@ void Painter::set_outfit(const maquette::RgbaImage& outfit) {
   outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
 }
 
-void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo) {
+void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
+                        const maquette::RgbaImage& sample) {
   upload(kRenderingTexture, rendering.width_px, rendering.height_px, rendering.rgba.data());
   if (!photo.empty()) upload(kPhotoTexture, photo.width_px, photo.height_px, photo.rgba.data());
-}
-
-void Painter::set_sample(const maquette::RgbaImage& sample) {
   if (!sample.empty()) upload(kSampleTexture, sample.width_px, sample.height_px, sample.rgba.data());
 }
 
@@ -153,14 +151,6 @@ void Painter::draw_scene(const Rect& rect, float slider) {
   use(scene_program_, rect);
   glUniform1f(uniform("slider"), slider);
   glDrawArrays(GL_TRIANGLES, 0, 3);
-}
-
-void Painter::draw_sample(const Rect& rect) {
-  use(scene_program_, rect);
-  glUniform1f(uniform("slider"), 1);
-  glUniform1i(uniform("photo"), kFirstUnit + kSampleTexture);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glUniform1i(uniform("photo"), kFirstUnit + kPhotoTexture);
 }
 
 void Painter::draw_body(const Rect& rect, float yaw, float pitch) {

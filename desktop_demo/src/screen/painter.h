@@ -17,14 +17,13 @@ class Painter {
   // repeated over the body's front and back.
   void set_outfit(const maquette::RgbaImage& outfit);
   void set_body(const maquette::DensePoseMesh& body);
-  void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo);
-  // A third picture beside the two of a scene.
-  void set_sample(const maquette::RgbaImage& sample);
+  void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
+                 const maquette::RgbaImage& sample = {});
 
   void draw_people(View view, const Rect& rect);
-  // `slider`: the fraction of the width that shows the photo.
+  // `slider`: the fraction of the width that shows the photo; kSample: the sample.
+  static constexpr float kSample = 2;
   void draw_scene(const Rect& rect, float slider);
-  void draw_sample(const Rect& rect);
   // The body from a direction, in radians, with what was seen of it in colour.
   void draw_body(const Rect& rect, float yaw, float pitch);
 

@@ -114,10 +114,11 @@ void main() {
 constexpr char kSceneShader[] = R"(#version 330 core
 in vec2 at;
 out vec4 colour;
-uniform sampler2D rendering, photo;
+uniform sampler2D rendering, photo, drawn;
 uniform float slider;
 void main() {
-  colour = vec4(at.x < slider ? texture(photo, at).rgb : texture(rendering, at).rgb, 1.0);
+  colour = slider > 1.5 ? texture(drawn, at) : at.x < slider ? texture(photo, at) : texture(rendering, at);
+  colour.a = 1.0;
 })";
 
 constexpr char kBodyVertexShader[] = R"(#version 330 core

@@ -157,6 +157,7 @@ DrawnFuture LiveDraws::draw(Predictor& predictor, const DrawChoice& choice, int6
   predictor.draw(1, count, std::max(1e-3, choice.ahead_s / count));
   DrawnFuture drawn;
   drawn.bits = predictor.uncertainty(0, count);
+  for (const float own : drawn.bits) drawn.mean_bits += double(own) / double(drawn.bits.size());
   if (choice.makes_picture) drawn.picture.copy_from(predictor.drawn(0, count));
   drawn.timestamp_ns = timestamp_ns;
   drawn.ahead_s = choice.ahead_s;

@@ -24,6 +24,7 @@ struct DrawChoice {
 
 struct DrawnFuture {
   std::vector<float> bits;   // of a code by cell, 16 rows of 16; 0 where nothing moves
+  double mean_bits = 0;      // of all cells
   RgbaImage picture;         // empty where it is not wanted
   int64_t timestamp_ns = 0;  // of the frame that it was drawn after
   double ahead_s = 0;        // of what was drawn, after that frame

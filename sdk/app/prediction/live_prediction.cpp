@@ -1,6 +1,7 @@
 #include "app/prediction/live_prediction.h"
 
 #include <algorithm>
+#include <cmath>
 #include <new>
 #include <utility>
 
@@ -15,10 +16,30 @@ constexpr int64_t kPatienceNs = 20000000;  // how late a change of what is wante
 constexpr double kMaxAheadS = 10;          // of a predictor
 constexpr auto kRetryFor = std::chrono::seconds(2), kSecond = std::chrono::seconds(1);
 constexpr auto kRetryEvery = std::chrono::milliseconds(100), kCloseWithin = std::chrono::milliseconds(200);
+constexpr double kFreshMs = 500, kStaleMs = 2000;
 constexpr uint32_t kFramesHeld = 3;
 constexpr size_t kMaxStatesKept = 1000, kMaxMomentsKept = 300;
 
+std::string whole(double value) { return std::to_string(std::lround(value)); }
+
 }  // namespace
+
+std::string text_of_method(const maq_predictor_stats& stats) {
+  if (stats.method == MAQ_PREDICTION_LAST) return "last";
+  if (stats.method == MAQ_PREDICTION_MOTION) return "motion";
+  return whole(100 * double(stats.motion_fraction)) + " % motion";
+}
+
+std::string text_of_next(const PredictionFrame& frame, bool has_uncertainty) {
+  const std::string text = "predicted +" + whole(frame.made_ahead_s * 1e3) + " ms, " + text_of_method(frame.stats);
+  if (!has_uncertainty) return text;
+  if (frame.drawn.number == 0) return text + "; no uncertainty yet";
+  return text + "; red: uncertain, " + whole(frame.drawn_age_ms) + " ms old";
+}
+
+std::string text_of_drawn(const PredictionFrame& frame) {
+  return "one that may come +" + whole(frame.drawn.ahead_s * 1e3) + " ms, " + whole(frame.drawn_age_ms) + " ms old";
+}
 
 LivePrediction::LivePrediction(const Context& context, const PredictionChoice& choice,
                                std::function<void(const PredictionFrame&)> on_frame, std::function<void()> on_change,
@@ -227,6 +248,7 @@ bool LivePrediction::take_draw() {
   }
   const bool is_newer = draws_->take(frame_.drawn);
   if (frame_.drawn.number > 0) frame_.drawn_age_ms = double(shown_ns_ - frame_.drawn.timestamp_ns) / 1e6;
+  frame_.drawn_freshness = std::clamp((kStaleMs - frame_.drawn_age_ms) / (kStaleMs - kFreshMs), 0.0, 1.0);
   return is_newer;
 }
 

@@ -51,9 +51,16 @@ struct PredictionFrame {
   double surprise_ms = 0;               // that it took
   DrawnFuture drawn;                    // the latest, of an earlier frame mostly; number 0: none, or not wanted
   double drawn_age_ms = 0;              // of that frame when `now` was shown
+  double drawn_freshness = 0;           // 1, less from 0.5 s on, 0 from 2 s on: how much it says of `next`
   double waiting_ms = 0, results_per_second = 0;
   uint64_t number = 0;  // 0: none yet
 };
+
+// What a window says of `next`: how far ahead it is, and what made it; and how old its uncertainty
+// is. Of what was drawn likewise.
+std::string text_of_method(const maq_predictor_stats& stats);
+std::string text_of_next(const PredictionFrame& frame, bool has_uncertainty);
+std::string text_of_drawn(const PredictionFrame& frame);
 
 class LivePrediction final : public LivePlayer {
  public:

@@ -169,7 +169,7 @@ def test_what_is_uncertain_is_red_over_what_comes_and_says_how_old_it_is(tmp_pat
     assert inside(drawn.rectangle("sample_px")).std() > 10
     off = show(tmp_path, "--next", PEOPLE, "--ahead", 100, "--frames", 6)
     assert np.percentile(redness(inside(off.rectangle("next_px"))), 99) < 80
-    assert off.report["drawn"] == {"number": 0}
+    assert off.report["drawn"]["number"] == 0
     without = headless("--next", "--uncertainty", "--prediction-bundle", ROOT / "tests", PEOPLE, "--frames", 3)
     assert without.returncode == 0, without.stderr
     assert "manifest.json" in without.stdout

@@ -1,0 +1,26 @@
+// Pictures of one shape beside and below each other.
+#pragma once
+
+#include <algorithm>
+
+namespace maquette {
+
+struct Tiling {
+  int columns = 0, rows = 0;
+  int width = 0, height = 0;  // of a picture
+};
+
+// As large as `count` pictures of `picture_width` : `picture_height` get in an area.
+inline Tiling tile(int count, int area_width, int area_height, int picture_width, int picture_height) {
+  Tiling best;
+  for (int columns = count; columns >= 1; --columns) {
+    const int rows = (count + columns - 1) / columns;
+    const double scale = std::min(double(area_width / columns) / std::max(1, picture_width),
+                                  double(area_height / rows) / std::max(1, picture_height));
+    const int width = int(picture_width * scale + 0.5);
+    if (width > best.width) best = {columns, rows, width, int(picture_height * scale + 0.5)};
+  }
+  return best;
+}
+
+}  // namespace maquette

@@ -118,7 +118,7 @@ class DensePose {
     Box beyond_body;  // from the bounds of the painted body to `box`, side by side, when the box head saw it
     std::optional<PersonCrop> first_view;  // where the first answer lies, of an image that was rotated
     std::optional<PersonCrop> crop;
-    float confidence = 0;           // of the answer from the whole image
+    float confidence = 0;           // of the answer in use, or of the first until there is one of the crop
     int64_t body_pixels = 0;        // when last painted
     const float* labels = nullptr;  // a dense head's answer, of the crop where there is one
     const float* surface = nullptr;
@@ -172,6 +172,11 @@ class DensePose {
   // Runs trunk and dense head over the crops of `mapped_`. Those answers take the place of the first, unless they are
   // clearly less confident; then the person loses the crop.
   void run_crops(const ImageView& image, DensePoseStats& stats);
+  // The person's score, in which the confidence of the answer counts as well.
+  float score_with_confidence(const MappedPerson& person) const;
+  // Of `mapped_`, by that score.
+  void drop_unlikely();
+  void sort_by_score();
   // Paints `mapped_` and adds those who got a pixel to `result`; they are followed in the next frame.
   void paint_people(DensePoseResult& result);
   // Gives the person, who was painted last, the crop of the next frame, and between key frames the box of this one.

@@ -29,7 +29,7 @@ from export.places.render import Lighting, Renderer
 from export.places.rooms import RoomMaker
 from export.places.subjects import ground, outdoors
 
-VERSION = "people-1"
+VERSION = "people-2"
 _COUNTS = (0.5, 0.35, 0.15)  # how often one, two, three people
 _PLACES = {"room": 0.45, "photograph": 0.35, "outdoors": 0.2}
 _CAMERAS = {"still": 0.4, "panned": 0.25, "hand-held": 0.35}

@@ -75,8 +75,8 @@ class PlaceFilm:
             fragment = _FRAGMENT.replace("CUTTING", cutting)
             self._programs[name] = renderer.context.program(vertex_shader=_VERTEX, fragment_shader=fragment)
         first = len(renderer.drawn) - len(owners)
-        for drawn in renderer.drawn[first:]:
-            # Where a joint squeezes a triangle to nothing, the rasteriser would take samples for minutes.
+        for drawn in renderer.drawn if owners else ():
+            # Where a triangle is squeezed to nothing, as by a joint, the rasteriser would take samples for minutes.
             drawn.texture.anisotropy = 1.0
         self._drawn = []  # what is drawn, where it will be (None: it stands still), its array, its number
         for k, drawn in enumerate(renderer.drawn):

@@ -16,8 +16,8 @@ inline Tiling tile(int count, int area_width, int area_height, int picture_width
   for (int columns = count; columns >= 1; --columns) {
     const int rows = (count + columns - 1) / columns;
     const int cell_width = area_width / columns, cell_height = area_height / rows;
-    const double scale = std::min(double(cell_width) / std::max(1, picture_width),
-                                  double(cell_height) / std::max(1, picture_height));
+    const double scale =
+        std::min(double(cell_width) / std::max(1, picture_width), double(cell_height) / std::max(1, picture_height));
     const int width = int(picture_width * scale + 0.5);
     if (width > best.width) best = {columns, rows, width, int(picture_height * scale + 0.5)};
   }

@@ -143,6 +143,7 @@ class DensePose {
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
+  // The whole image at the settings' size, rotated upright by that many steps of its roll.
   ImageInput input_of(const ImageView& image, int roll_steps) const;
   // Of the trunk's outputs for such an input, into `shapes_`; of one that gives all levels the evidence, too.
   void set_level_shapes(int width_px, int height_px, size_t levels);
@@ -176,7 +177,7 @@ class DensePose {
   float score_with_confidence(const MappedPerson& person) const;
   // Of `mapped_`, by that score.
   void drop_unlikely();
-  void sort_by_score();
+  void sort_by_score();  // `mapped_`, best first
   // Paints `mapped_` and adds those who got a pixel to `result`; they are followed in the next frame.
   void paint_people(DensePoseResult& result);
   // Gives the person, who was painted last, the crop of the next frame, and between key frames the box of this one.

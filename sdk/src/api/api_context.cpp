@@ -1,5 +1,6 @@
 #include "api/boundary.h"
 #include "core/build_info.h"
+#include "prediction/predictor_workspace.h"
 
 using namespace maq;
 
@@ -68,8 +69,9 @@ maq_status maq_context_create(uint32_t header_version, const maq_context_config*
         read_config(given, "config", default_context_config(), sizeof(maq_context_config));
     require_range("config.log_level", number_in(config.log_level), int32_t(MAQ_LOG_OFF), int32_t(MAQ_LOG_DEBUG));
     const char* library = config.onnxruntime_library;
-    *context = new maq_context(std::make_shared<ContextState>(
-        Log(config.log_level, config.log_callback, config.log_user_data), library == nullptr ? "" : library));
+    *context = new maq_context(
+        std::make_shared<ContextState>(Log(config.log_level, config.log_callback, config.log_user_data),
+                                       library == nullptr ? "" : library, std::make_shared<PredictorWorkspaces>()));
     return MAQ_OK;
   });
 }

@@ -35,11 +35,11 @@ maq_concealer_config default_concealer_config() {
   return config;
 }
 
-PredictorSettings predictor_settings(int32_t threads, const maq_prediction_method& method,
+PredictorSettings predictor_settings(const ContextState& state, int32_t threads, const maq_prediction_method& method,
                                      maq_prediction_method last_method) {
   require_range("config.threads", threads, 0, kMaxThreads);
   require_range("config.method", number_in(method), int32_t(MAQ_PREDICTION_AUTO), int32_t(last_method));
-  return {method, threads != 0 ? threads : default_threads()};
+  return {method, threads != 0 ? threads : default_threads(), state.predictor_workspaces()};
 }
 
 maq_predictor_config default_predictor_config() {
@@ -75,6 +75,7 @@ NetworksOfMode open_networks_of_mode(ContextState& state, const maq_predictor_co
                 " has no networks that foresee pictures so; use another bundle, network_mode or method.");
   }
   NetworksOfMode opened;
+  opened.networks.workspaces = state.predictor_workspaces();
   opened.networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
   opened.networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
   switch (mode) {
@@ -135,7 +136,8 @@ maq_status maq_predictor_create(maq_context* context, const maq_predictor_config
     const maq_predictor_config config =
         read_config(given, "config", default_predictor_config(), sizeof(maq_predictor_config));
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings settings = predictor_settings(config.threads, config.method, MAQ_PREDICTION_NETWORK);
+    const PredictorSettings settings =
+        predictor_settings(*context->state, config.threads, config.method, MAQ_PREDICTION_NETWORK);
     std::unique_ptr<Predictor> alone;
     std::unique_ptr<NetworkPredictor> by_networks;
     if (config.method == MAQ_PREDICTION_NETWORK) {
@@ -241,7 +243,8 @@ maq_status maq_concealer_create(maq_context* context, maq_source* source, const 
         read_config(given, "config", default_concealer_config(), sizeof(maq_concealer_config));
     require_range("config.max_gap_ms", config.max_gap_ms, 1, 10000);
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
-    const PredictorSettings predictor = predictor_settings(config.threads, config.method, MAQ_PREDICTION_MOTION);
+    const PredictorSettings predictor =
+        predictor_settings(*context->state, config.threads, config.method, MAQ_PREDICTION_MOTION);
     if (source->is_concealed->exchange(true)) {
       throw Error(MAQ_ERROR_BUSY, kConcealedTwice);
     }

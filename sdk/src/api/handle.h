@@ -48,12 +48,16 @@ class HandleOf : public Handle {
   static void operator delete(void* memory) noexcept { HandleState::retire(memory, kind); }
 };
 
+class PredictorWorkspaces;
+
 // What the objects made from a context keep of it when it is destroyed before them.
 class ContextState {
  public:
-  ContextState(Log log, std::string onnxruntime_path) : log_(log), onnxruntime_path_(std::move(onnxruntime_path)) {}
+  ContextState(Log log, std::string onnxruntime_path, std::shared_ptr<PredictorWorkspaces> workspaces)
+      : log_(log), onnxruntime_path_(std::move(onnxruntime_path)), predictor_workspaces_(std::move(workspaces)) {}
 
   const Log& log() const { return log_; }
+  const std::shared_ptr<PredictorWorkspaces>& predictor_workspaces() const { return predictor_workspaces_; }
 
   // Opens the library at the first call; tries again after a failure.
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime() {
@@ -65,6 +69,7 @@ class ContextState {
  private:
   Log log_;
   std::string onnxruntime_path_;
+  const std::shared_ptr<PredictorWorkspaces> predictor_workspaces_;
   std::mutex mutex_;
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime_;
 };

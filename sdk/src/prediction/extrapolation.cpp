@@ -64,7 +64,7 @@ const FlowField& Extrapolation::project(const FlowField& flow, float intervals) 
 
 void Extrapolation::fetch(const ImageView& image, const FlowField& field, int scale, const CellWeights* weights,
                           WorkerThreads& threads, uint8_t* pixels) {
-  rows_.resize(size_t(threads.count()));
+  if (rows_.size() < size_t(threads.count())) rows_.resize(size_t(threads.count()));
   PlaneSamples planes[2];
   const int count = plane_samples(image, pixels, planes);
   for (int plane = 0; plane < count; ++plane) {

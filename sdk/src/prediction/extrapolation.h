@@ -17,7 +17,7 @@ namespace maq {
 // lie, what was behind appears, and the surroundings stretch over it.
 class Extrapolation {
  public:
-  // Takes nothing from the heap for fields of the same size as those before. The field stays until the next call.
+  // Takes nothing from the heap for fields of a size that was there before. The field stays until the next call.
   const FlowField& project(const FlowField& flow, float intervals);
 
   // Fetches each pixel of a coming picture from `image` along `field`, whose pixels are `scale` pixels of it each way;

@@ -107,21 +107,58 @@ void GreyLevel::resize(int width, int height) {
   memory.resize(stride() * size_t(height + 2 * kBorder_px));
 }
 
+void GreyPyramid::resize(int width, int height) {
+  count_ = 1;
+  for (int side = divide_up(std::min(width, height), 2); side >= kMinSide_px; side = divide_up(side, 2)) ++count_;
+  if (levels_.size() < count_) levels_.resize(count_);
+  levels_[0].resize(width, height);
+}
+
+void GreyPyramid::set_coarser() {
+  for (size_t i = 1; i < count_; ++i) {
+    const GreyLevel& above = levels_[i - 1];
+    GreyLevel& level = levels_[i];
+    level.resize(divide_up(above.width_px, 2), divide_up(above.height_px, 2));
+    for (int y = 0; y < level.height_px; ++y) {
+      halve_row(above.at(0, 2 * y), above.at(0, 2 * y + 1), level.width_px, level.at(0, y));
+      repeat_ends(level, y);
+    }
+    repeat_first_and_last_row(level);
+  }
+}
+
+void GreyPyramid::set_finest(const float* grey, int width_px, int height_px, int scale) {
+  scale_ = scale;
+  resize(width_px, height_px);
+  GreyLevel& finest = levels_[0];
+  for (int y = 0; y < height_px; ++y, grey += width_px) {
+    std::copy(grey, grey + width_px, finest.at(0, y));
+    repeat_ends(finest, y);
+  }
+  repeat_first_and_last_row(finest);
+  set_coarser();
+}
+
+void GreyPyramid::copy_finest(float* grey) const {
+  const GreyLevel& finest = levels_[0];
+  for (int y = 0; y < finest.height_px; ++y, grey += finest.width_px) {
+    std::copy(finest.at(0, y), finest.at(finest.width_px, y), grey);
+  }
+}
+
 void GreyPyramid::set(const ImageView& image, WorkerThreads& threads) {
   require_picture(image);
   const Brightness as = brightness_of(image.format);
   scale_ = 1;
   while (2 * std::max(image.width_px, image.height_px) > 3 * kLongSide_px * scale_) scale_ *= 2;
   const int width = divide_up(image.width_px, scale_), height = divide_up(image.height_px, scale_);
-  size_t count = 1;
-  for (int side = divide_up(std::min(width, height), 2); side >= kMinSide_px; side = divide_up(side, 2)) ++count;
-  levels_.resize(count);
+  resize(width, height);
   means_.resize(size_t(width) * size_t(height));
   GreyLevel& finest = levels_[0];
-  finest.resize(width, height);
-
-  sums_.resize(size_t(threads.count()));
-  columns_.resize(size_t(threads.count()));
+  if (sums_.size() < size_t(threads.count())) {
+    sums_.resize(size_t(threads.count()));
+    columns_.resize(sums_.size());
+  }
   const size_t tasks = size_t(divide_up(height, kGreyRowsOfTask));
   threads.run(tasks, [&](size_t task, int worker) {
     std::vector<int>& sums = sums_[size_t(worker)];
@@ -146,16 +183,7 @@ void GreyPyramid::set(const ImageView& image, WorkerThreads& threads) {
     }
   });
   repeat_first_and_last_row(finest);
-  for (size_t i = 1; i < count; ++i) {
-    const GreyLevel& above = levels_[i - 1];
-    GreyLevel& level = levels_[i];
-    level.resize(divide_up(above.width_px, 2), divide_up(above.height_px, 2));
-    for (int y = 0; y < level.height_px; ++y) {
-      halve_row(above.at(0, 2 * y), above.at(0, 2 * y + 1), level.width_px, level.at(0, y));
-      repeat_ends(level, y);
-    }
-    repeat_first_and_last_row(level);
-  }
+  set_coarser();
 }
 
 }  // namespace maq

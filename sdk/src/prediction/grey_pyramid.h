@@ -36,22 +36,30 @@ class GreyPyramid {
   static constexpr int kLongSide_px = 320;
   static constexpr int kMinSide_px = 16;  // of the coarsest level, unless the picture is smaller
 
-  // Takes nothing from the heap for an image of the same size as the one before. Throws MAQ_ERROR_UNSUPPORTED for a
-  // depth image.
+  // Of an image. Here and below nothing is taken from the heap for a size and a number of threads that were there
+  // before. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
   void set(const ImageView& image, WorkerThreads& threads);
+  // That of an image whose finest level was kept, in rows without a border.
+  void set_finest(const float* grey, int width_px, int height_px, int scale);
+  void copy_finest(float* grey) const;
 
   // Pixels of the frame, each way, that one of the finest level is the mean of.
   int scale() const { return scale_; }
   // The finest first; at least one.
-  const std::vector<GreyLevel>& levels() const { return levels_; }
+  size_t level_count() const { return count_; }
+  const GreyLevel& level(size_t index) const { return levels_[index]; }
 
  private:
+  void resize(int width, int height);
+  void set_coarser();
+
   int scale_ = 1;
+  size_t count_ = 0;
   std::vector<float> means_;  // of the finest level, before it is smoothed
   // Of a worker each: sums over the rows that a pixel is the mean of, and a row smoothed one way.
   std::vector<std::vector<int>> sums_;
   std::vector<std::vector<float>> columns_;
-  std::vector<GreyLevel> levels_;
+  std::vector<GreyLevel> levels_;  // count_, and others of larger images
 };
 
 }  // namespace maq

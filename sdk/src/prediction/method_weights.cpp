@@ -55,9 +55,8 @@ void MethodWeights::reset() {
 }
 
 // Into `errors`, a running mean of those so far. Each cell is judged together with those around it.
-void MethodWeights::take(Horizon& horizon, const Past& now, const uint8_t* predicted,
+void MethodWeights::take(const Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& latest,
                          std::vector<float>& errors) const {
-  std::vector<float>& latest = horizon.latest;
   latest.assign(size_t(columns_) * size_t(rows_), 0.0f);
   errors.resize(latest.size());
   const size_t width = size_t(now.width_px);
@@ -89,7 +88,7 @@ void MethodWeights::take(Horizon& horizon, const Past& now, const uint8_t* predi
   }
 }
 
-void MethodWeights::judge(Horizon& horizon, const Past& now) const {
+void MethodWeights::judge(Horizon& horizon, const Past& now, MethodJudge& judge) const {
   const Past* nearest = nullptr;
   for (size_t i = 0; i < std::min(count_, kFrames); ++i) {
     const Past& past = past_[(count_ - 1 - i) % kFrames];
@@ -97,26 +96,26 @@ void MethodWeights::judge(Horizon& horizon, const Past& now) const {
     if (past.interval_ns > 0 && (nearest == nullptr || away(past) < away(*nearest))) nearest = &past;
   }
   if (nearest == nullptr || ratio(now.timestamp_ns - nearest->timestamp_ns, horizon.ahead_ns) > kMaxRatio) return;
-  take(horizon, now, nearest->grey.data(), horizon.last_errors);
+  take(horizon, now, nearest->grey.data(), judge.latest, horizon.last_errors);
   const uint8_t* moved = nearest->grey.data();
   if (nearest->moves) {
     const float intervals = float(double(now.timestamp_ns - nearest->timestamp_ns) / double(nearest->interval_ns));
     const ImageView image{
         MAQ_PIXEL_GREY8, now.width_px, now.height_px, {{nearest->grey.data(), size_t(now.width_px)}, {}}};
-    horizon.predicted.resize(nearest->grey.size());
-    horizon.extrapolation.fetch(image, horizon.extrapolation.project(nearest->flow, intervals), 1, nullptr,
-                                horizon.alone, horizon.predicted.data());
-    moved = horizon.predicted.data();
+    judge.predicted.resize(nearest->grey.size());
+    judge.extrapolation.fetch(image, judge.extrapolation.project(nearest->flow, intervals), 1, nullptr, judge.alone,
+                              judge.predicted.data());
+    moved = judge.predicted.data();
   }
-  take(horizon, now, moved, horizon.motion_errors);
+  take(horizon, now, moved, judge.latest, horizon.motion_errors);
   horizon.count = std::min(horizon.count + 1, 1000);
 }
 
 void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
-                        WorkerThreads& threads) {
+                        WorkerThreads& threads, MethodJudges& judges) {
   // At half the size of the flow: it tells the methods apart, in a quarter of the time.
-  const GreyLevel& level = pyramid.levels()[pyramid.levels().size() > 1 ? 1 : 0];
-  const int step = pyramid.levels().size() > 1 ? 2 : 1;
+  const GreyLevel& level = pyramid.level(pyramid.level_count() > 1 ? 1 : 0);
+  const int step = pyramid.level_count() > 1 ? 2 : 1;
   columns_ = divide_up(level.width_px, kCell_px);
   rows_ = divide_up(level.height_px, kCell_px);
   cell_px_ = step * kCell_px;
@@ -140,7 +139,8 @@ void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const 
       now_.moves = now_.moves || flow.dx_px[at] != 0 || flow.dy_px[at] != 0;
     }
   }
-  threads.run(kHorizons, [&](size_t i, int) { judge(horizons_[i], now_); });
+  while (judges.size() < size_t(threads.count())) judges.push_back(std::make_unique<MethodJudge>());
+  threads.run(kHorizons, [&](size_t i, int worker) { judge(horizons_[i], now_, *judges[size_t(worker)]); });
   // At more than 32 frames a second not each is remembered, so that they reach back far enough.
   if (count_ > 0 && timestamp_ns - past_[(count_ - 1) % kFrames].timestamp_ns < kMinStep_ns) return;
   std::swap(past_[count_ % kFrames], now_);

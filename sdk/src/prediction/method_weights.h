@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/worker_threads.h"
@@ -12,6 +13,15 @@
 #include "prediction/optical_flow.h"
 
 namespace maq {
+
+// What judging takes of memory, of a worker each; not needed afterwards.
+struct MethodJudge {
+  Extrapolation extrapolation;
+  std::vector<uint8_t> predicted;
+  std::vector<float> latest;  // of each cell: mean square of the differences
+  WorkerThreads alone{1};
+};
+using MethodJudges = std::vector<std::unique_ptr<MethodJudge>>;
 
 class MethodWeights {
  public:
@@ -24,7 +34,7 @@ class MethodWeights {
   // `interval_ns`, of the pyramid's finest level; 0: none is known, as of a stream's first frame. Takes nothing from
   // the heap once kFrames frames of a size have come.
   void add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
-           WorkerThreads& threads);
+           WorkerThreads& threads, MethodJudges& judges);
 
   // How much of each place is motion's, the rest being the last frame's, by their errors there at the horizon nearest
   // to that. Of none where nothing is known yet. Stays until the next call.
@@ -45,15 +55,13 @@ class MethodWeights {
   // count more: a moment in which everything was wrong must not outweigh many.
   struct Horizon {
     int64_t ahead_ns = 0;
-    std::vector<float> last_errors, motion_errors, latest;
+    std::vector<float> last_errors, motion_errors;
     int count = 0;
-    Extrapolation extrapolation;
-    std::vector<uint8_t> predicted;
-    WorkerThreads alone{1};
   };
 
-  void judge(Horizon& horizon, const Past& now) const;
-  void take(Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& errors) const;
+  void judge(Horizon& horizon, const Past& now, MethodJudge& judge) const;
+  void take(const Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& latest,
+            std::vector<float>& errors) const;
 
   std::array<Horizon, kHorizons> horizons_;
   std::array<Past, kFrames> past_;

@@ -89,7 +89,7 @@ void OpticalFlow::hold_still(WorkerThreads& threads) {
 
 void OpticalFlow::densify(const GreyLevel& from, const GreyLevel& to, WorkerThreads& threads, FlowField& flow) {
   flow.resize(from.width_px, from.height_px);
-  votes_.resize(size_t(threads.count()));
+  if (votes_.size() < size_t(threads.count())) votes_.resize(size_t(threads.count()));
   const size_t width = size_t(from.width_px);
   threads.run(size_t(divide_up(from.height_px, kStep_px)), [&](size_t band, int worker) {
     std::vector<float>& votes = votes_[size_t(worker)];
@@ -146,23 +146,23 @@ void OpticalFlow::smooth(WorkerThreads& threads, FlowField& flow) {
 }
 
 FlowFit OpticalFlow::find(const GreyPyramid& from, const GreyPyramid& to, WorkerThreads& threads, FlowField& flow) {
-  const GreyLevel& finest = from.levels()[0];
+  const GreyLevel& finest = from.level(0);
   if (std::min(finest.width_px, finest.height_px) < kPatch_px) {
     flow.resize(finest.width_px, finest.height_px);
     std::fill(flow.dx_px.begin(), flow.dx_px.end(), 0.0f);
     std::fill(flow.dy_px.begin(), flow.dy_px.end(), 0.0f);
     return {};
   }
-  fields_.resize(from.levels().size());
+  if (fields_.size() < from.level_count()) fields_.resize(from.level_count());
   const FlowField* coarser = nullptr;
-  for (size_t i = from.levels().size(); i-- > 0;) {
-    match(from.levels()[i], to.levels()[i], coarser, threads);
+  for (size_t i = from.level_count(); i-- > 0;) {
+    match(from.level(i), to.level(i), coarser, threads);
     if (i == 0) break;
-    densify(from.levels()[i], to.levels()[i], threads, fields_[i]);
+    densify(from.level(i), to.level(i), threads, fields_[i]);
     coarser = &fields_[i];
   }
   hold_still(threads);
-  densify(finest, to.levels()[0], threads, flow);
+  densify(finest, to.level(0), threads, flow);
   smooth(threads, flow);
   FlowFit fit;
   const float each = 1.0f / float(patches_.size());

@@ -35,7 +35,7 @@ class OpticalFlow {
  public:
   // From each pixel of `from`'s finest level to where it is in `to`, a pyramid of the same sizes. Where moving explains
   // the second picture hardly better than standing still, the displacement is 0 exactly, so that noise does not move.
-  // Takes nothing from the heap for pictures of the same size as those before. Not for two threads at once.
+  // Takes nothing from the heap for a size and a number of threads that were there before. Not for two threads at once.
   FlowFit find(const GreyPyramid& from, const GreyPyramid& to, WorkerThreads& threads, FlowField& flow);
 
  private:
@@ -46,7 +46,7 @@ class OpticalFlow {
 
   int columns_ = 0, rows_ = 0;  // of patches
   std::vector<Patch> patches_, next_;
-  std::vector<FlowField> fields_;          // by level, of the coarser ones
+  std::vector<FlowField> fields_;          // by level, of the coarser ones; more of larger pictures
   FlowField across_;                       // smoothed along its rows alone
   std::vector<std::vector<float>> votes_;  // of a worker each: weights, and weighted displacements
 };

@@ -27,9 +27,15 @@ bool is_same_kind(const ImageView& one, const ImageView& other) {
   return one.format == other.format && one.width_px == other.width_px && one.height_px == other.height_px;
 }
 
+PredictorSettings with_workspaces(PredictorSettings settings) {
+  if (settings.workspaces == nullptr) settings.workspaces = std::make_shared<PredictorWorkspaces>();
+  return settings;
+}
+
 }  // namespace
 
-Predictor::Predictor(const PredictorSettings& settings) : settings_(settings), threads_(settings.threads) {}
+Predictor::Predictor(const PredictorSettings& settings)
+    : settings_(with_workspaces(settings)), threads_(settings.threads) {}
 
 void Predictor::reset() {
   has_frame_ = has_before_ = moves_ = false;
@@ -51,11 +57,11 @@ void Predictor::keep(const Frame& frame) {
     }
   }
   if (has_frame_ && !is_again_) {
-    std::swap(now_, before_);
+    std::swap(newest_grey_, before_grey_);
     before_ns_ = newest_.timestamp_ns;
-    has_before_ = true;
+    has_before_ = has_grey_;
   }
-  has_frame_ = false;  // until all of it is known
+  has_frame_ = has_grey_ = false;  // until all of it is known
   const ImageView& image = frame.image;
   const size_t bytes = packed_bytes(image.format, image.width_px, image.height_px);
   newest_.storage.resize(bytes + 1);
@@ -74,13 +80,19 @@ void Predictor::follow() {
   if (!has_frame_) return;
   const Stopwatch whole;
   Stopwatch stage;
-  now_.set(newest_.image, threads_);
-  stats_.grey_ms = float(stage.lap_ms());
-
-  stats_.flow_ms = stats_.choice_ms = 0;
+  stats_.grey_ms = stats_.flow_ms = stats_.choice_ms = 0;
   if (settings_.method != MAQ_PREDICTION_LAST) {
+    const PredictorWorkspaces::Borrowed work = settings_.workspaces->borrow();
+    work->now.set(newest_.image, threads_);
+    const GreyLevel& finest = work->now.level(0);
+    scale_ = work->now.scale();
+    if (has_before_) work->before.set_finest(before_grey_.data(), finest.width_px, finest.height_px, scale_);
+    newest_grey_.resize(size_t(finest.width_px) * size_t(finest.height_px));
+    work->now.copy_finest(newest_grey_.data());
+    has_grey_ = true;
+    stats_.grey_ms = float(stage.lap_ms());
     if (has_before_) {
-      const FlowFit fit = optical_flow_.find(now_, before_, threads_, flow_);
+      const FlowFit fit = work->optical_flow.find(work->now, work->before, threads_, flow_);
       if (fit.moved > kCutFraction * fit.contrast) {
         method_weights_.reset();
         has_before_ = false;
@@ -94,7 +106,7 @@ void Predictor::follow() {
     }
     stats_.flow_ms = float(stage.lap_ms());
     if (settings_.method == MAQ_PREDICTION_AUTO && !is_again_) {
-      method_weights_.add(now_, newest_.timestamp_ns, flow_, interval_ns_, threads_);
+      method_weights_.add(work->now, newest_.timestamp_ns, flow_, interval_ns_, threads_, work->judges);
       stats_.choice_ms = float(stage.lap_ms());
     }
   }
@@ -128,9 +140,10 @@ void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   stats_.project_ms = 0;
   if (method != MAQ_PREDICTION_LAST) {
     const float intervals = float(double(ahead_ns) / double(interval_ns_));
-    const FlowField& field = extrapolation_.project(flow_, intervals);
+    const PredictorWorkspaces::Borrowed work = settings_.workspaces->borrow();
+    const FlowField& field = work->extrapolation.project(flow_, intervals);
     stats_.project_ms = float(stage.lap_ms());
-    extrapolation_.fetch(image, field, now_.scale(), weights, threads_, pixels);
+    work->extrapolation.fetch(image, field, scale_, weights, threads_, pixels);
   } else {
     copy_packed(image, pixels);
   }

@@ -2,20 +2,22 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "core/frame.h"
 #include "core/worker_threads.h"
 #include "maquette/prediction.h"
-#include "prediction/extrapolation.h"
-#include "prediction/grey_pyramid.h"
 #include "prediction/method_weights.h"
 #include "prediction/optical_flow.h"
+#include "prediction/predictor_workspace.h"
 
 namespace maq {
 
 struct PredictorSettings {
   maq_prediction_method method = MAQ_PREDICTION_AUTO;
   int threads = 1;
+  std::shared_ptr<PredictorWorkspaces> workspaces = nullptr;  // null: its own
 };
 
 // As in maq_predictor_stats.
@@ -66,14 +68,15 @@ class Predictor {
   Frame newest_;  // the image in its own memory, and a byte
   bool has_frame_ = false;
   bool is_again_ = false;    // the newest one replaced one of its time
-  bool has_before_ = false;  // a frame that the newest one goes on from; its grey levels are those of before_
+  bool has_grey_ = false;    // newest_grey_ is the newest frame's
+  bool has_before_ = false;  // a frame that the newest one goes on from, whose grey levels are there
   int64_t before_ns_ = 0;    // its time
   int64_t interval_ns_ = 0;  // of flow_; 0: no motion is known
   bool moves_ = false;
-  GreyPyramid now_, before_;
+  // Of the pyramids of the newest frame and of the one before, the finest levels.
+  std::vector<float> newest_grey_, before_grey_;
+  int scale_ = 1;  // of these
   FlowField flow_;
-  OpticalFlow optical_flow_;
-  Extrapolation extrapolation_;
   MethodWeights method_weights_;
   PredictorStats stats_;
 };

@@ -20,7 +20,7 @@ constexpr float kTrust = 0.5f, kNoise = 0.5f;
 NetworkPredictor::NetworkPredictor(PredictionNetworks networks, const NetworkSettings& settings, int threads)
     : networks_(std::move(networks)),
       settings_(settings),
-      base_({MAQ_PREDICTION_AUTO, threads}),
+      base_({MAQ_PREDICTION_AUTO, threads, networks_.workspaces}),
       threads_(threads),
       history_(networks_.encoder->codes().count()),
       pictures_(size_t(networks_.encoder->frame_px()) * size_t(networks_.encoder->frame_px()) * 3),

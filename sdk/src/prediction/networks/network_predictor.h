@@ -19,13 +19,14 @@
 
 namespace maq {
 
-// Shared by streams. The last three may be null where no predictor has that mode.
+// Shared by streams. Networks of modes that no predictor has may be null.
 struct PredictionNetworks {
   std::shared_ptr<FrameEncoder> encoder;
   std::shared_ptr<FrameDecoder> decoder;
   std::shared_ptr<MendedPicture> mended;
   std::shared_ptr<ExpectedFrame> expected;
   std::shared_ptr<CodeTransformer> transformer;
+  std::shared_ptr<PredictorWorkspaces> workspaces;  // of their predictors; null: each its own
 };
 
 enum class NetworkMode {

@@ -83,7 +83,8 @@ typedef struct maq_predictor_stats {
 MAQ_API maq_status maq_predictor_config_init(maq_predictor_config* config, uint32_t struct_size);
 
 /* Makes a predictor for one stream. `config` may be NULL for the defaults. `*predictor` is the caller's, to be given to
- * maq_predictor_destroy.
+ * maq_predictor_destroy. Those of a context that take turns share the memory that they work in: beside it a further one
+ * keeps a frame and some 1 MB (of 640 x 480 pixels).
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. With MAQ_PREDICTION_NETWORK a bundle of the task "prediction" is
  * loaded and checked: MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_UNSUPPORTED (a bundle of another task, or
  * without the networks of that mode), MAQ_ERROR_RUNTIME_LIBRARY; blocks while files are read. Else does not block. */

@@ -14,6 +14,7 @@ constexpr int64_t kFirstHorizon_ns = 1000000000 / 30;  // each later one is twic
 constexpr int64_t kMinStep_ns = 1000000000 / 32;       // between frames that are remembered
 constexpr double kMaxRatio = 1.5;                      // of a frame's age to the horizon that it stands for
 constexpr float kMinWeight = 0.1f;                     // of the newest frame in the running errors
+constexpr int kFlowStep = 2;                           // each way, from pixel to pixel of a remembered flow
 constexpr int kCell_px = 8;                            // each way, at half the size of the flow
 constexpr float kRoundingError = 0.3f;                 // mean square of what rounding to whole grey levels leaves
 constexpr float kMeanFraction = 0.3f;  // of the mean over all places: errors of few frames in one place say little
@@ -27,6 +28,26 @@ int squares_of_run(const uint8_t* __restrict one, const uint8_t* __restrict othe
   int sum = 0;  // at most 65,025 each
   for (int i = 0; i < count; ++i) sum += (one[i] - other[i]) * (one[i] - other[i]);
   return sum;
+}
+
+// Every step-th displacement each way, mean of the four in the middle, in pixels of the thin field.
+void thin_out(const FlowField& flow, int step, FlowField& thin) {
+  thin.resize(divide_up(flow.width_px, step), divide_up(flow.height_px, step));
+  const float factor = 0.25f / float(step);
+  for (int y = 0; y < thin.height_px; ++y) {
+    const int lower = std::min(y * step + step / 2, flow.height_px - 1), upper = std::max(lower - 1, y * step);
+    for (int x = 0; x < thin.width_px; ++x) {
+      const int right = std::min(x * step + step / 2, flow.width_px - 1), left = std::max(right - 1, x * step);
+      const auto mean = [&](const std::vector<float>& of) {
+        const float* const above = of.data() + size_t(upper) * size_t(flow.width_px);
+        const float* const below = of.data() + size_t(lower) * size_t(flow.width_px);
+        return (above[left] + above[right] + (below[left] + below[right])) * factor;
+      };
+      const size_t at = size_t(y) * size_t(thin.width_px) + size_t(x);
+      thin.dx_px[at] = mean(flow.dx_px);
+      thin.dy_px[at] = mean(flow.dy_px);
+    }
+  }
 }
 
 float mean_of(const std::vector<float>& values) {
@@ -88,10 +109,22 @@ void MethodWeights::take(const Horizon& horizon, const Past& now, const uint8_t*
   }
 }
 
+// Of kFrames that are remembered, the one to forget: ages then stay spread evenly by their ratios, as the horizons are.
+size_t MethodWeights::redundant_frame(int64_t now_ns) const {
+  const auto age_ns = [&](size_t index) { return double(now_ns - past_[index].timestamp_ns); };
+  if (age_ns(kFrames - 1) > kMaxRatio * double(horizons_.back().ahead_ns)) return kFrames - 1;
+  size_t found = 1;
+  const auto without = [&](size_t index) { return age_ns(index + 1) / age_ns(index - 1); };
+  for (size_t i = 2; i + 1 < kFrames; ++i) {
+    if (without(i) < without(found)) found = i;
+  }
+  return found;
+}
+
 void MethodWeights::judge(Horizon& horizon, const Past& now, MethodJudge& judge) const {
   const Past* nearest = nullptr;
-  for (size_t i = 0; i < std::min(count_, kFrames); ++i) {
-    const Past& past = past_[(count_ - 1 - i) % kFrames];
+  for (size_t i = 0; i < count_; ++i) {
+    const Past& past = past_[i];
     const auto away = [&](const Past& of) { return ratio(now.timestamp_ns - of.timestamp_ns, horizon.ahead_ns); };
     if (past.interval_ns > 0 && (nearest == nullptr || away(past) < away(*nearest))) nearest = &past;
   }
@@ -103,8 +136,9 @@ void MethodWeights::judge(Horizon& horizon, const Past& now, MethodJudge& judge)
     const ImageView image{
         MAQ_PIXEL_GREY8, now.width_px, now.height_px, {{nearest->grey.data(), size_t(now.width_px)}, {}}};
     judge.predicted.resize(nearest->grey.size());
-    judge.extrapolation.fetch(image, judge.extrapolation.project(nearest->flow, intervals), 1, nullptr, judge.alone,
-                              judge.predicted.data());
+    nearest->flow.unpack(judge.flow);
+    judge.extrapolation.fetch(image, judge.extrapolation.project(judge.flow, intervals), kFlowStep, nullptr,
+                              judge.alone, judge.predicted.data());
     moved = judge.predicted.data();
   }
   take(horizon, now, moved, judge.latest, horizon.motion_errors);
@@ -119,32 +153,29 @@ void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const 
   columns_ = divide_up(level.width_px, kCell_px);
   rows_ = divide_up(level.height_px, kCell_px);
   cell_px_ = step * kCell_px;
-  now_.timestamp_ns = timestamp_ns;
-  now_.interval_ns = interval_ns;
-  now_.width_px = level.width_px;
-  now_.height_px = level.height_px;
-  now_.grey.resize(size_t(level.width_px) * size_t(level.height_px) + 1);
-  now_.flow.resize(level.width_px, level.height_px);
-  now_.moves = false;
+  FlowField& thin = judges[0].flow;
+  Past& now = past_.back();
+  now.timestamp_ns = timestamp_ns;
+  now.interval_ns = interval_ns;
+  now.width_px = level.width_px;
+  now.height_px = level.height_px;
+  now.grey.resize(size_t(level.width_px) * size_t(level.height_px) + 1);
   for (int y = 0; y < level.height_px; ++y) {
-    const size_t row = size_t(y) * size_t(level.width_px);
     const float* const grey = level.at(0, y);
-    for (int x = 0; x < level.width_px; ++x) now_.grey[row + size_t(x)] = uint8_t(grey[x] + 0.5f);
-    if (interval_ns <= 0) continue;
-    const size_t from = size_t(y * step) * size_t(flow.width_px);
-    for (int x = 0; x < level.width_px; ++x) {
-      const size_t at = from + size_t(x * step);
-      now_.flow.dx_px[row + size_t(x)] = flow.dx_px[at] / float(step);
-      now_.flow.dy_px[row + size_t(x)] = flow.dy_px[at] / float(step);
-      now_.moves = now_.moves || flow.dx_px[at] != 0 || flow.dy_px[at] != 0;
-    }
+    uint8_t* const row = now.grey.data() + size_t(y) * size_t(level.width_px);
+    for (int x = 0; x < level.width_px; ++x) row[x] = uint8_t(grey[x] + 0.5f);
   }
-  while (judges.size() < size_t(threads.count())) judges.push_back(std::make_unique<MethodJudge>());
-  threads.run(kHorizons, [&](size_t i, int worker) { judge(horizons_[i], now_, *judges[size_t(worker)]); });
+  now.moves = false;
+  if (interval_ns > 0) {
+    thin_out(flow, step * kFlowStep, thin);
+    now.moves = now.flow.pack(thin);
+  }
+  threads.run(kHorizons, [&](size_t i, int) { judge(horizons_[i], now, judges[i]); });
   // At more than 32 frames a second not each is remembered, so that they reach back far enough.
-  if (count_ > 0 && timestamp_ns - past_[(count_ - 1) % kFrames].timestamp_ns < kMinStep_ns) return;
-  std::swap(past_[count_ % kFrames], now_);
-  ++count_;
+  if (count_ > 0 && timestamp_ns - past_[0].timestamp_ns < kMinStep_ns) return;
+  size_t at = count_ < kFrames ? count_++ : redundant_frame(timestamp_ns);
+  std::swap(past_[at], past_.back());
+  for (; at > 0; --at) std::swap(past_[at], past_[at - 1]);
 }
 
 const CellWeights& MethodWeights::at(int64_t ahead_ns) {

@@ -4,24 +4,26 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "core/worker_threads.h"
 #include "prediction/extrapolation.h"
 #include "prediction/grey_pyramid.h"
 #include "prediction/optical_flow.h"
+#include "prediction/packed_flow.h"
 
 namespace maq {
 
-// What judging takes of memory, of a worker each; not needed afterwards.
+// What judging by one horizon takes of memory; not needed afterwards.
 struct MethodJudge {
+  FlowField flow;
   Extrapolation extrapolation;
   std::vector<uint8_t> predicted;
   std::vector<float> latest;  // of each cell: mean square of the differences
   WorkerThreads alone{1};
 };
-using MethodJudges = std::vector<std::unique_ptr<MethodJudge>>;
+inline constexpr size_t kMethodHorizons = 5;
+using MethodJudges = std::array<MethodJudge, kMethodHorizons>;
 
 class MethodWeights {
  public:
@@ -32,7 +34,7 @@ class MethodWeights {
 
   // A frame has arrived: first the methods are judged by it, then it is remembered. `flow` is its motion over
   // `interval_ns`, of the pyramid's finest level; 0: none is known, as of a stream's first frame. Takes nothing from
-  // the heap once kFrames frames of a size have come.
+  // the heap once a dozen frames of a size have come.
   void add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
            WorkerThreads& threads, MethodJudges& judges);
 
@@ -41,13 +43,13 @@ class MethodWeights {
   const CellWeights& at(int64_t ahead_ns);
 
  private:
-  static constexpr size_t kHorizons = 5, kFrames = 16;
+  static constexpr size_t kHorizons = kMethodHorizons, kFrames = 8;
 
   struct Past {
     int64_t timestamp_ns = 0, interval_ns = 0;
     int width_px = 0, height_px = 0;
     std::vector<uint8_t> grey;  // and a byte
-    FlowField flow;
+    PackedFlow flow;            // at half the size of `grey`
     bool moves = false;
   };
 
@@ -59,14 +61,15 @@ class MethodWeights {
     int count = 0;
   };
 
+  size_t redundant_frame(int64_t now_ns) const;
   void judge(Horizon& horizon, const Past& now, MethodJudge& judge) const;
   void take(const Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& latest,
             std::vector<float>& errors) const;
 
   std::array<Horizon, kHorizons> horizons_;
-  std::array<Past, kFrames> past_;
-  size_t count_ = 0;  // of all frames remembered so far; the newest lies before it in past_, round and round
-  Past now_;
+  // Those that are remembered, the newest first, and last of all room for another.
+  std::array<Past, kFrames + 1> past_;
+  size_t count_ = 0;
   int columns_ = 0, rows_ = 0, cell_px_ = 0;  // of cells; cell_px_ in pixels of the flow
   CellWeights weights_;
 };

@@ -19,6 +19,13 @@ int begin_of(int index, int side) { return std::min(index * kStep_px, side - kPa
 
 }  // namespace
 
+void FlowField::resize(int width, int height) {
+  width_px = width;
+  height_px = height;
+  dx_px.resize(size_t(width) * size_t(height));
+  dy_px.resize(dx_px.size());
+}
+
 void OpticalFlow::match(const GreyLevel& from, const GreyLevel& to, const FlowField* coarser, WorkerThreads& threads) {
   columns_ = divide_up(from.width_px - kPatch_px, kStep_px) + 1;
   rows_ = divide_up(from.height_px - kPatch_px, kStep_px) + 1;

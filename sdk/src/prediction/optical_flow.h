@@ -16,12 +16,7 @@ struct FlowField {
   int width_px = 0, height_px = 0;
   std::vector<float> dx_px, dy_px;
 
-  void resize(int width, int height) {
-    width_px = width;
-    height_px = height;
-    dx_px.resize(size_t(width) * size_t(height));
-    dy_px.resize(dx_px.size());
-  }
+  void resize(int width, int height);
 };
 
 // How well the two pictures fit, as means over the patches of squares of brightness around the patch's mean.

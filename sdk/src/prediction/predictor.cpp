@@ -27,15 +27,13 @@ bool is_same_kind(const ImageView& one, const ImageView& other) {
   return one.format == other.format && one.width_px == other.width_px && one.height_px == other.height_px;
 }
 
-PredictorSettings with_workspaces(PredictorSettings settings) {
-  if (settings.workspaces == nullptr) settings.workspaces = std::make_shared<PredictorWorkspaces>();
-  return settings;
-}
-
 }  // namespace
 
-Predictor::Predictor(const PredictorSettings& settings)
-    : settings_(with_workspaces(settings)), threads_(settings.threads) {}
+Predictor::Predictor(const PredictorSettings& settings) : settings_(settings), threads_(settings.threads) {}
+
+PredictorWorkspaces::Borrowed Predictor::borrow() {
+  return (settings_.workspaces != nullptr ? *settings_.workspaces : own_workspaces_).borrow();
+}
 
 void Predictor::reset() {
   has_frame_ = has_before_ = moves_ = false;
@@ -57,7 +55,11 @@ void Predictor::keep(const Frame& frame) {
     }
   }
   if (has_frame_ && !is_again_) {
-    std::swap(newest_grey_, before_grey_);
+    if (has_grey_) {
+      before_grey_.resize(newest_grey_.size());
+      std::transform(newest_grey_.begin(), newest_grey_.end(), before_grey_.begin(),
+                     [](float grey) { return uint8_t(grey + 0.5f); });
+    }
     before_ns_ = newest_.timestamp_ns;
     has_before_ = has_grey_;
   }
@@ -82,31 +84,32 @@ void Predictor::follow() {
   Stopwatch stage;
   stats_.grey_ms = stats_.flow_ms = stats_.choice_ms = 0;
   if (settings_.method != MAQ_PREDICTION_LAST) {
-    const PredictorWorkspaces::Borrowed work = settings_.workspaces->borrow();
+    const PredictorWorkspaces::Borrowed work = borrow();
     work->now.set(newest_.image, threads_);
     const GreyLevel& finest = work->now.level(0);
     scale_ = work->now.scale();
-    if (has_before_) work->before.set_finest(before_grey_.data(), finest.width_px, finest.height_px, scale_);
+    if (has_before_) {
+      if (is_again_) std::copy(before_grey_.begin(), before_grey_.end(), newest_grey_.begin());
+      work->before.set_finest(newest_grey_.data(), finest.width_px, finest.height_px, scale_);
+    }
     newest_grey_.resize(size_t(finest.width_px) * size_t(finest.height_px));
     work->now.copy_finest(newest_grey_.data());
     has_grey_ = true;
     stats_.grey_ms = float(stage.lap_ms());
     if (has_before_) {
-      const FlowFit fit = work->optical_flow.find(work->now, work->before, threads_, flow_);
+      const FlowFit fit = work->optical_flow.find(work->now, work->before, threads_, work->flow);
       if (fit.moved > kCutFraction * fit.contrast) {
         method_weights_.reset();
         has_before_ = false;
         ++stats_.resets;
       } else {
         interval_ns_ = newest_.timestamp_ns - before_ns_;
-        const auto is_none = [](float displacement) { return displacement == 0; };
-        moves_ = !std::all_of(flow_.dx_px.begin(), flow_.dx_px.end(), is_none) ||
-                 !std::all_of(flow_.dy_px.begin(), flow_.dy_px.end(), is_none);
+        moves_ = flow_.pack(work->flow);
       }
     }
     stats_.flow_ms = float(stage.lap_ms());
     if (settings_.method == MAQ_PREDICTION_AUTO && !is_again_) {
-      method_weights_.add(work->now, newest_.timestamp_ns, flow_, interval_ns_, threads_, work->judges);
+      method_weights_.add(work->now, newest_.timestamp_ns, work->flow, interval_ns_, threads_, work->judges);
       stats_.choice_ms = float(stage.lap_ms());
     }
   }
@@ -140,8 +143,9 @@ void Predictor::predict(int64_t ahead_ns, Frame& frame) {
   stats_.project_ms = 0;
   if (method != MAQ_PREDICTION_LAST) {
     const float intervals = float(double(ahead_ns) / double(interval_ns_));
-    const PredictorWorkspaces::Borrowed work = settings_.workspaces->borrow();
-    const FlowField& field = work->extrapolation.project(flow_, intervals);
+    const PredictorWorkspaces::Borrowed work = borrow();
+    flow_.unpack(work->flow);
+    const FlowField& field = work->extrapolation.project(work->flow, intervals);
     stats_.project_ms = float(stage.lap_ms());
     work->extrapolation.fetch(image, field, scale_, weights, threads_, pixels);
   } else {

@@ -9,7 +9,7 @@
 #include "core/worker_threads.h"
 #include "maquette/prediction.h"
 #include "prediction/method_weights.h"
-#include "prediction/optical_flow.h"
+#include "prediction/packed_flow.h"
 #include "prediction/predictor_workspace.h"
 
 namespace maq {
@@ -63,7 +63,10 @@ class Predictor {
   const PredictorSettings& settings() const { return settings_; }
 
  private:
+  PredictorWorkspaces::Borrowed borrow();
+
   const PredictorSettings settings_;
+  PredictorWorkspaces own_workspaces_;  // where the settings have none
   WorkerThreads threads_;
   Frame newest_;  // the image in its own memory, and a byte
   bool has_frame_ = false;
@@ -73,10 +76,11 @@ class Predictor {
   int64_t before_ns_ = 0;    // its time
   int64_t interval_ns_ = 0;  // of flow_; 0: no motion is known
   bool moves_ = false;
-  // Of the pyramids of the newest frame and of the one before, the finest levels.
-  std::vector<float> newest_grey_, before_grey_;
-  int scale_ = 1;  // of these
-  FlowField flow_;
+  std::vector<float> newest_grey_;  // the finest level of its pyramid
+  int scale_ = 1;                   // of that
+  // The same of the frame before, in whole grey levels: for a frame that replaces the newest one.
+  std::vector<uint8_t> before_grey_;
+  PackedFlow flow_;
   MethodWeights method_weights_;
   PredictorStats stats_;
 };

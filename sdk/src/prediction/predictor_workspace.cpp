@@ -4,23 +4,24 @@
 
 namespace maq {
 
+PredictorWorkspaces::PredictorWorkspaces() = default;
+PredictorWorkspaces::~PredictorWorkspaces() = default;
+
 PredictorWorkspaces::Borrowed PredictorWorkspaces::borrow() {
   std::lock_guard<std::mutex> lock(mutex_);
-  std::unique_ptr<PredictorWorkspace> found;
-  if (idle_.empty()) {
-    idle_.reserve(made_ + 1);
+  std::unique_ptr<PredictorWorkspace> found = std::move(idle_);
+  if (found == nullptr) {
     found = std::make_unique<PredictorWorkspace>();
-    ++made_;
   } else {
-    found = std::move(idle_.back());
-    idle_.pop_back();
+    idle_ = std::move(found->next);
   }
   return {found.release(), {this}};
 }
 
 void PredictorWorkspaces::give_back(PredictorWorkspace* workspace) noexcept {
   std::lock_guard<std::mutex> lock(mutex_);
-  idle_.emplace_back(workspace);
+  workspace->next = std::move(idle_);
+  idle_.reset(workspace);
 }
 
 }  // namespace maq

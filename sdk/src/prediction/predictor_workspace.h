@@ -4,7 +4,6 @@
 
 #include <memory>
 #include <mutex>
-#include <vector>
 
 #include "prediction/extrapolation.h"
 #include "prediction/grey_pyramid.h"
@@ -19,6 +18,7 @@ struct PredictorWorkspace {
   FlowField flow;
   Extrapolation extrapolation;
   MethodJudges judges;
+  std::unique_ptr<PredictorWorkspace> next;  // while nothing works in it
 };
 
 // As many as predictors ever worked at once. For any thread.
@@ -30,6 +30,9 @@ class PredictorWorkspaces {
   };
   using Borrowed = std::unique_ptr<PredictorWorkspace, GiveBack>;
 
+  PredictorWorkspaces();
+  ~PredictorWorkspaces();
+
   // The one that was given back last, so that a stream alone has its own; a new one where all are in use.
   Borrowed borrow();
 
@@ -37,8 +40,7 @@ class PredictorWorkspaces {
   void give_back(PredictorWorkspace* workspace) noexcept;
 
   std::mutex mutex_;
-  std::vector<std::unique_ptr<PredictorWorkspace>> idle_;  // with room for all
-  size_t made_ = 0;
+  std::unique_ptr<PredictorWorkspace> idle_;
 };
 
 }  // namespace maq

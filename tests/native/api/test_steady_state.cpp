@@ -193,6 +193,8 @@ TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
     config.method = method;
     config.threads = 2;
     maquette::Predictor predictor(context, config);
+    config.threads = 1;
+    maquette::Predictor other(context, config);  // whose frames are smaller, in the same memory
     maquette::Source source(context, "stub:people?count=2&size=320x240&fps=30");
     std::vector<maquette::Frame> frames;
     for (int i = 0; i < 4; ++i) frames.push_back(std::move(*source.next()));
@@ -206,11 +208,18 @@ TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
         desc.stride_bytes[0] = 0;
         desc.timestamp_ns = time_ns += 33333333;
         const maquette::Frame frame(context, desc);
+        maq_frame_desc part = desc;
+        part.stride_bytes[0] = 320 * 3;
+        part.width_px = 100;
+        part.height_px = 60;
+        const maquette::Frame smaller(context, part);
         counting = true;
-        ASSERT_EQ(maq_predictor_push(predictor.get(), frame.get()), MAQ_OK);
-        maq_frame* predicted = nullptr;
-        ASSERT_EQ(maq_predictor_predict(predictor.get(), 0.1, &predicted), MAQ_OK);
-        maq_frame_release(predicted);
+        for (const auto& [stream, shown] : {std::pair{&predictor, &frame}, {&other, &smaller}}) {
+          ASSERT_EQ(maq_predictor_push(stream->get(), shown->get()), MAQ_OK);
+          maq_frame* predicted = nullptr;
+          ASSERT_EQ(maq_predictor_predict(stream->get(), 0.1, &predicted), MAQ_OK);
+          maq_frame_release(predicted);
+        }
         counting = false;
       }
     };

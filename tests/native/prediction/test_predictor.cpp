@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <random>
 
 #include "support/expect_error.h"
@@ -295,6 +296,54 @@ TEST(Predictor, EverySizeIsPredicted) {
       }
     }
   }
+}
+
+TEST(Predictor, PredictorsThatTakeTurnsInOneMemoryPredictAsThoseAlone) {
+  const auto shared = std::make_shared<maq::PredictorWorkspaces>();
+  struct Stream {
+    int width, height;
+    maq::Predictor turn, alone;
+  };
+  Stream streams[] = {
+      {kWidth, kHeight, maq::Predictor({MAQ_PREDICTION_AUTO, 1, shared}), maq::Predictor({MAQ_PREDICTION_AUTO, 1})},
+      {96, 64, maq::Predictor({MAQ_PREDICTION_MOTION, 2, shared}), maq::Predictor({MAQ_PREDICTION_MOTION, 1})},
+      {24, 700, maq::Predictor({MAQ_PREDICTION_AUTO, 1, shared}), maq::Predictor({MAQ_PREDICTION_AUTO, 1})}};
+  maq::Frame turn, alone;
+  for (int i = 0; i < 12; ++i) {
+    for (Stream& stream : streams) {
+      const maq::Frame frame =
+          moving_texture::frame(MAQ_PIXEL_NV12, stream.width, stream.height, 1.5 * i, -0.5 * i, i * kFrame_ns);
+      stream.turn.push(frame);
+      stream.alone.push(frame);
+    }
+    for (Stream& stream : streams) {
+      stream.turn.predict(3 * kFrame_ns, turn);
+      stream.alone.predict(3 * kFrame_ns, alone);
+      EXPECT_EQ(pixels_of(turn), pixels_of(alone)) << i << " " << stream.width;
+      EXPECT_EQ(stream.alone.moves(), i > 0);
+    }
+  }
+}
+
+TEST(Predictor, AFurtherOneKeepsLessThanTwoMegabytes) {
+  const auto shared = std::make_shared<maq::PredictorWorkspaces>();
+  std::vector<maq::Frame> frames;
+  for (int i = 0; i < 12; ++i) {
+    frames.push_back(moving_texture::frame(MAQ_PIXEL_BGR8, 640, 480, 3 * i, i, i * kFrame_ns));
+  }
+  std::vector<std::unique_ptr<maq::Predictor>> predictors;
+  maq::Frame predicted;
+  const auto add = [&] {
+    predictors.push_back(std::make_unique<maq::Predictor>(maq::PredictorSettings{MAQ_PREDICTION_AUTO, 1, shared}));
+    for (const maq::Frame& frame : frames) predictors.back()->push(frame);
+    predictors.back()->predict(kFrame_ns, predicted);
+  };
+  add();
+  constexpr int kFurther = 6;
+  const double growth_mib = peak_memory_growth_mib([&] {
+    for (int i = 0; i < kFurther; ++i) add();
+  });
+  EXPECT_LT(growth_mib * 1024 * 1024 / kFurther, 2e6);
 }
 
 TEST(Predictor, TenThousandFramesRolledOutStayInRangeAndTakeNoMoreMemory) {

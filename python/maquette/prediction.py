@@ -14,6 +14,7 @@ from maquette.frames import Frame, Source, acquired_frame
 from maquette.native import NativeObject, native
 
 METHODS = ("auto", "last", "motion", "network")  # of maq_prediction_method
+NETWORK_MODES = ("auto", "mended", "expected", "drawn")  # of maq_network_mode
 SURPRISE_METHODS = ("auto", "table")  # of maq_surprise_method
 
 
@@ -82,7 +83,8 @@ class Predictor(NativeObject):
     @property
     def stats(self) -> dict[str, float]:
         """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`: an
-        index into METHODS; `motion_fraction`: how much of the picture is motion's."""
+        index into METHODS; `motion_fraction`: how much of the picture is motion's; `network_mode`: an index into
+        NETWORK_MODES, whose networks ran (0: none); `step_count`, `pass_count`: how often."""
         return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
 
 

@@ -76,6 +76,12 @@ typedef struct maq_predictor_stats {
   uint32_t drawn_count; /* frames drawn for the latest prediction or maq_predictor_draw */
   uint32_t cell_count;  /* of maq_predictor_copy_uncertainty: 256, 16 rows of 16 in the bundles of this SDK; 0 without
                            networks */
+  /* Of the latest prediction or maq_predictor_draw: */
+  maq_network_mode network_mode; /* whose networks ran; MAQ_NETWORK_AUTO: none, as while nothing moves */
+  uint32_t step_count; /* codes drawn one after another: steps from cell to cell, each of all samples; cell_count a
+                          frame */
+  uint32_t pass_count; /* passes over all cells of a frame at once: 1 of MAQ_NETWORK_MENDED and MAQ_NETWORK_EXPECTED; of
+                          codes drawn in passes those of all frames and samples, at most config.passes each */
 } maq_predictor_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_predictor_config) of the caller.

@@ -213,17 +213,23 @@ maq_status maq_predictor_reset(maq_predictor* predictor) {
   });
 }
 
+static_assert(int(NetworkMode::kMended) + 1 == MAQ_NETWORK_MENDED && int(NetworkMode::kDrawn) + 1 == MAQ_NETWORK_DRAWN);
+
 maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor_stats* stats) {
   return guarded_alone(predictor, "predictor", __func__, [&] {
     const NetworkPredictor* const by_network = predictor->by_network.get();
     const PredictorStats& from = by_network != nullptr ? by_network->stats() : predictor->predictor->stats();
+    const DrawCounts counts = by_network != nullptr ? by_network->counts() : DrawCounts{};
+    const bool has_run = counts.steps + counts.passes > 0;
     write_struct(
         stats, "stats",
         maq_predictor_stats{0, from.grey_ms, from.flow_ms, from.choice_ms, from.push_ms, from.project_ms, from.fetch_ms,
                             from.predict_ms, from.method, from.motion_fraction, from.pushed, from.predicted,
                             from.resets, by_network != nullptr ? by_network->networks_ms() : 0.0f,
                             by_network != nullptr ? uint32_t(by_network->steps()) : 0u,
-                            by_network != nullptr ? uint32_t(by_network->places()) : 0u},
+                            by_network != nullptr ? uint32_t(by_network->places()) : 0u,
+                            has_run ? maq_network_mode(int(by_network->settings().mode) + 1) : MAQ_NETWORK_AUTO,
+                            uint32_t(counts.steps), uint32_t(counts.passes)},
         sizeof(maq_predictor_stats));
     return MAQ_OK;
   });

@@ -94,6 +94,18 @@ TEST_F(ApiPrediction, ByNetworksItIsAnotherPictureOfTheSameTimeAndSize) {
   EXPECT_EQ(drawn.stats().drawn_count, 3u);
   EXPECT_GT(expected.stats().networks_ms, 0);
   EXPECT_EQ(automatic.stats().networks_ms, 0);
+  const auto expect_runs = [](const maquette::Predictor& of, maq_network_mode mode, uint32_t steps, uint32_t passes) {
+    const maq_predictor_stats stats = of.stats();
+    EXPECT_EQ(stats.network_mode, mode);
+    EXPECT_EQ(stats.step_count, steps) << mode;
+    EXPECT_EQ(stats.pass_count, passes) << mode;
+  };
+  expect_runs(automatic, MAQ_NETWORK_AUTO, 0, 0);
+  expect_runs(mended, MAQ_NETWORK_MENDED, 0, 1);
+  expect_runs(expected, MAQ_NETWORK_EXPECTED, 0, 1);
+  expect_runs(drawn, MAQ_NETWORK_DRAWN, 3 * 256, 0);
+  mended.predict(0);  // nothing is to be foreseen
+  expect_runs(mended, MAQ_NETWORK_AUTO, 0, 0);
   EXPECT_EQ(drawn.stats().pushed_count, 5u);
   drawn.reset();
   EXPECT_THROW(drawn.predict(0.1), maquette::Error);
@@ -142,6 +154,8 @@ TEST_F(ApiPrediction, SamplesAreMarkedFramesThatDependOnNoOther) {
   }
   predictor.draw(3, 2, 0.1);
   EXPECT_EQ(predictor.stats().drawn_count, 6u);
+  EXPECT_EQ(predictor.stats().step_count, 2 * 256u) << "of all samples at once";
+  EXPECT_EQ(predictor.stats().pass_count, 0u);
   const maquette::Frame drawn = predictor.drawn(1, 2);
   const std::vector<float> bits = predictor.uncertainty(1, 2);
   EXPECT_EQ(drawn.desc().width_px, 320);
@@ -163,6 +177,30 @@ TEST_F(ApiPrediction, SamplesAreMarkedFramesThatDependOnNoOther) {
   while (const auto frame = same.next()) another.push(*frame);
   another.draw(2, 2, 0.1);
   EXPECT_NE(another.uncertainty(1, 2), bits);
+}
+
+TEST_F(ApiPrediction, PassesAreCountedUntilTheySettle) {
+  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+  config.passes = 2;
+  config.temperature = 1;
+  maquette::Predictor two(context_, config);
+  config.passes = 16;
+  config.temperature = 0;
+  maquette::Predictor until_settled(context_, config);
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=4");
+  while (const auto frame = source.next()) {
+    two.push(*frame);
+    until_settled.push(*frame);
+    two.draw(1, 1, 0.1);
+    EXPECT_EQ(two.stats().pass_count == 0, two.stats().pushed_count == 1) << "then nothing is known to move";
+  }
+  two.draw(3, 2, 0.1);
+  until_settled.draw(1, 1, 0.1);
+  EXPECT_EQ(two.stats().network_mode, MAQ_NETWORK_DRAWN);
+  EXPECT_EQ(two.stats().pass_count, 3 * 2 * 2u);
+  EXPECT_EQ(two.stats().step_count, 0u);
+  EXPECT_GT(until_settled.stats().pass_count, 1u);
+  EXPECT_LE(until_settled.stats().pass_count, 16u);
 }
 
 TEST_F(ApiPrediction, PredictorsThatShareNetworksDrawAsAloneAndOutliveOneAnother) {

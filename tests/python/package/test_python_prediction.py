@@ -57,6 +57,9 @@ def test_samples_are_drawn_each_by_itself_and_say_where_they_are_uncertain():
         for number in range(4):
             predictor.push(textured(STEP_PX * number), time_s=number * PERIOD_S)
         predictor.draw(3, 2, PERIOD_S)
+        stats = predictor.stats
+        assert maquette.prediction.NETWORK_MODES[int(stats["network_mode"])] == "drawn"
+        assert (stats["drawn_count"], stats["step_count"], stats["pass_count"]) == (6, 2 * 256, 0)
         frame, bits = predictor.drawn(1, 2), predictor.uncertainty(1, 2)
         assert frame.origin.horizon_s == pytest.approx(2 * PERIOD_S)
         assert bits.shape == (16, 16)

@@ -92,6 +92,7 @@ size_t NetworkPredictor::codes_at(size_t sample, size_t number) const {
 
 void NetworkPredictor::draw(size_t samples, size_t count, int64_t step_ns) {
   count_ = samples_ = steps_ = 0;
+  counts_ = {};
   networks_ms_ = 0;
   if (settings_.mode != NetworkMode::kDrawn) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "This predictor draws no samples; make one whose network_mode does.");
@@ -124,8 +125,11 @@ void NetworkPredictor::draw(size_t samples, size_t count, int64_t step_ns) {
         histories_[k == 1 ? 0 : s].select(time_ns, transformer.before(), before.frames.data());
         if (transformer.has_motion()) before.frames[transformer.before()] = moved;
       }
-      transformer.draw(before_, settings_.sampling, uint32_t(base_.stats().pushed), uint32_t(k), settings_.passes,
-                       codes, entropy_.data() + (codes - drawn_.data()));
+      const DrawCounts counts =
+          transformer.draw(before_, settings_.sampling, uint32_t(base_.stats().pushed), uint32_t(k), settings_.passes,
+                           codes, entropy_.data() + (codes - drawn_.data()));
+      counts_.steps += counts.steps;
+      counts_.passes += counts.passes;
     }
     networks_ms_ = float(stage.lap_ms());
     steps_ = samples * count;
@@ -170,12 +174,14 @@ void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
   base_.predict(ahead_ns, frame);
   networks_ms_ = 0;
   count_ = steps_ = 0;
+  counts_ = {};
   if (ahead_ns == 0 || step_ns_ == 0 || !base_.moves()) return;
   Stopwatch stage;
   switch (settings_.mode) {
     case NetworkMode::kMended:
       networks_.encoder->squeeze(frame.image, squeezed_.data());
       mend(ahead_ns);
+      counts_.passes = 1;
       for (size_t i = 0; i < made_.size(); ++i) {
         const float difference = (made_[i] - float(squeezed_[i])) * kTrust;
         made_[i] = difference - std::clamp(difference, -kNoise, kNoise);
@@ -184,6 +190,7 @@ void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
       break;
     case NetworkMode::kExpected:
       foresee(ahead_ns);
+      counts_.passes = 1;
       networks_.decoder->picture(features_.data(), made_.data());
       add_made(frame);
       break;

@@ -80,6 +80,8 @@ class NetworkPredictor {
   const PredictorStats& stats() const { return base_.stats(); }
   float networks_ms() const { return networks_ms_; }  // of the latest push, prediction or draw
   size_t steps() const { return steps_; }             // frames that were drawn for the latest prediction or draw
+  // How often networks foresaw for it: the mended picture or the expected codes are one pass. None where nothing moved.
+  const DrawCounts& counts() const { return counts_; }
 
  private:
   // Of the time `ahead_ns` after the newest frame: a picture into made_; features of the decoder.
@@ -111,6 +113,7 @@ class NetworkPredictor {
   uint64_t resets_ = 0;                  // of base_
   float networks_ms_ = 0;
   size_t steps_ = 0;
+  DrawCounts counts_;
 };
 
 }  // namespace maq

@@ -98,13 +98,14 @@ uint16_t CodeTransformer::draw_code(CodeSampler& sampler, const DrawPosition& po
   return sampler.draw(logits_.data(), position);
 }
 
-void CodeTransformer::draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first,
-                                     size_t passes, uint16_t* codes, float* entropy) {
+size_t CodeTransformer::draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first,
+                                       size_t passes, uint16_t* codes, float* entropy) {
   const TransformerTables& tables = parts_.tables;
   const uint16_t* const by_motion = has_motion() ? before.frames[tables.before] : nullptr;
   std::copy_n(by_motion != nullptr ? by_motion : before.newest, tables.places() * tables.slices, codes);
   bool is_other = true;
-  for (size_t pass = 0; pass < passes && is_other; ++pass) {
+  size_t pass = 0;
+  for (; pass < passes && is_other; ++pass) {
     is_other = false;
     see_places(codes);
     DrawPosition at = first;
@@ -121,6 +122,7 @@ void CodeTransformer::draw_in_passes(const CodesBefore& before, CodeSampler& sam
       }
     }
   }
+  return pass;
 }
 
 void CodeTransformer::draw_in_steps(const std::vector<CodesBefore>& before, CodeSampler& sampler,
@@ -162,8 +164,8 @@ void CodeTransformer::draw_in_steps(const std::vector<CodesBefore>& before, Code
   }
 }
 
-void CodeTransformer::draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling, uint32_t stream,
-                           uint32_t frame, size_t passes, uint16_t* codes, float* entropy) {
+DrawCounts CodeTransformer::draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling,
+                                 uint32_t stream, uint32_t frame, size_t passes, uint16_t* codes, float* entropy) {
   CodeSampler sampler(sampling, parts_.tables.entries);
   const std::lock_guard<std::mutex> lock(mutex_);
   const size_t of_frame = parts_.tables.places() * parts_.tables.slices;
@@ -171,17 +173,20 @@ void CodeTransformer::draw(const std::vector<CodesBefore>& before, const Samplin
   at.stream = stream;
   at.frame = frame;
   drawn_.resize(before.size() * of_frame);
+  DrawCounts counts;
   if (passes == 0) {
     draw_in_steps(before, sampler, at, entropy);
+    counts.steps = parts_.tables.places();
   } else {
     for (size_t s = 0; s < before.size(); ++s) {
       at.sample = uint16_t(s);
       see_context(before[s]);
-      draw_in_passes(before[s], sampler, at, passes, drawn_.data() + s * of_frame,
-                     entropy == nullptr ? nullptr : entropy + s * of_frame);
+      counts.passes += draw_in_passes(before[s], sampler, at, passes, drawn_.data() + s * of_frame,
+                                      entropy == nullptr ? nullptr : entropy + s * of_frame);
     }
   }
   std::copy(drawn_.begin(), drawn_.end(), codes);
+  return counts;
 }
 
 }  // namespace maq

@@ -22,6 +22,12 @@ struct CodesBefore {
   float step_s = 0;                  // from that to the frame; the nearest that the network knows is taken
 };
 
+// How often networks ran for frames that were drawn.
+struct DrawCounts {
+  size_t steps = 0;   // for a place each, of all samples at once
+  size_t passes = 0;  // for all places of a frame
+};
+
 // For several streams, from any thread: their frames are seen one after another.
 class CodeTransformer {
  public:
@@ -45,8 +51,8 @@ class CodeTransformer {
   // numbers. `entropy`, unless null: of each code's probabilities, in bits. Throws what bits() throws, and what
   // CodeSampler throws; `codes` are then as before.
   static constexpr size_t kMaxSamples = 16, kMaxPasses = 16;
-  void draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling, uint32_t stream, uint32_t frame,
-            size_t passes, uint16_t* codes, float* entropy);
+  DrawCounts draw(const std::vector<CodesBefore>& before, const SamplingSettings& sampling, uint32_t stream,
+                  uint32_t frame, size_t passes, uint16_t* codes, float* entropy);
 
  private:
   void see_context(const CodesBefore& before);
@@ -55,8 +61,9 @@ class CodeTransformer {
   const float* head_logits(size_t slice, const uint16_t* codes);
   // By logits_, which are known.
   uint16_t draw_code(CodeSampler& sampler, const DrawPosition& position, float* entropy) const;
-  void draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first, size_t passes,
-                      uint16_t* codes, float* entropy);
+  // How many there were.
+  size_t draw_in_passes(const CodesBefore& before, CodeSampler& sampler, const DrawPosition& first, size_t passes,
+                        uint16_t* codes, float* entropy);
   void draw_in_steps(const std::vector<CodesBefore>& before, CodeSampler& sampler, const DrawPosition& first,
                      float* entropy);
   // Logits of a head, with the table by the code that the place had before, into logits_.

@@ -115,14 +115,15 @@ MAQ_NATIVE_OF(NativePrediction, void, resetPredictor)(JNIEnv* env, jclass, jlong
   call(env, [&] { check(maq_predictor_reset(object<maq_predictor>(predictor))); });
 }
 
-// In the order of maq_predictor_stats.
+// In the order of Predictor.Stats.
 MAQ_NATIVE_OF(NativePrediction, jdoubleArray, statsOfPredictor)(JNIEnv* env, jclass, jlong predictor) {
   return call(env, [&] {
     auto s = sized<maq_predictor_stats>();
     check(maq_predictor_get_stats(object<maq_predictor>(predictor), &s));
     return maq_jni::doubles_of(
         env, {s.grey_ms, s.flow_ms, s.choice_ms, s.push_ms, s.project_ms, s.fetch_ms, s.predict_ms, double(s.method),
-              s.motion_fraction, double(s.pushed_count), double(s.predicted_count), double(s.reset_count)});
+              s.motion_fraction, double(s.pushed_count), double(s.predicted_count), double(s.reset_count),
+              s.networks_ms, double(s.drawn_count), double(s.step_count), double(s.pass_count)});
   });
 }
 

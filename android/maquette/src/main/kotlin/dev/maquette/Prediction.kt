@@ -76,6 +76,10 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @property method of the latest prediction: [Method.LAST] or [Method.MOTION] where one made all of it.
      * @property motionFraction how much of it is motion's, 0 to 1.
      * @property resetCount frames that did not go on from the one before, so that it was forgotten.
+     * @property networksMs of networks at the latest push, prediction or [draw]; 0 where nothing moved.
+     * @property drawnCount frames drawn for the latest prediction or [draw].
+     * @property stepCount of that: steps from code to code, each of all samples, 256 a frame; 0 where nothing moved.
+     * @property passCount of that: passes over all codes of a frame at once, with [Sampling.passes].
      */
     data class Stats(
         val greyMs: Double,
@@ -90,6 +94,10 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
         val pushedCount: Long,
         val predictedCount: Long,
         val resetCount: Long,
+        val networksMs: Double,
+        val drawnCount: Int,
+        val stepCount: Int,
+        val passCount: Int,
     )
 
     /**
@@ -148,7 +156,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
             val s = handle.use(NativePrediction::statsOfPredictor)
             return Stats(
                 s[0], s[1], s[2], s[3], s[4], s[5], s[6], Method.entries[s[7].toInt()], s[8], s[9].toLong(),
-                s[10].toLong(), s[11].toLong(),
+                s[10].toLong(), s[11].toLong(), s[12], s[13].toInt(), s[14].toInt(), s[15].toInt(),
             )
         }
 

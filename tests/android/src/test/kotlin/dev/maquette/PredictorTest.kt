@@ -110,6 +110,10 @@ class PredictorTest : AndroidTest() {
             predictor.draw(3, 2, stepS = 0.1)
             val bits = predictor.uncertainty(1, 2)
             assertEquals(256, bits.size)
+            with(predictor.stats) {
+                assertEquals(listOf(6, 2 * 256, 0), listOf(drawnCount, stepCount, passCount))
+                assertTrue(networksMs > 0)
+            }
             assertTrue("${bits.average()}", bits.average() in 0.3..9.0)
             predictor.drawn(1, 2).use { assertEquals(200_000_000L, it.origin!!.horizonNs) }
             predictor.draw(2, 2, stepS = 0.1)

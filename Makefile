@@ -98,7 +98,7 @@ bench: build packages-test  ## speed, size and error against benchmarks/targets.
 	@scripts/make-venv.sh train,bench
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
 	@cmake --build --preset release -j $(JOBS) --target measure_start measure_live_source measure_live_scene \
-	    measure_frame_budget measure_edges measure_prediction print_solids_truth
+	    measure_frame_budget measure_edges measure_prediction find_motion print_solids_truth
 	@.venv/bin/python -m benchmarks
 
 .PHONY: format

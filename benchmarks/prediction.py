@@ -1,13 +1,14 @@
-"""What is predicted of clips: PSNR by time ahead beside the last frame and OpenCV's DIS, run times, how long a
-concealer's frames are waited for and how near the truth they are; how long surprise takes.
+"""What is predicted of clips: PSNR and SSIM by time ahead beside the last frame and OpenCV's DIS, how exact the motion
+behind it is, run times, how long a concealer's frames are waited for and how near the truth they are; how long surprise
+takes.
 
     python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (12 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
     python -m benchmarks --only prediction                  the same as a part of the report
 
-Needs clips of `export.clips` (.data/clips/pushing/val), those of `export.photos` (.data/photos/clip), and the program
-measure_prediction (`cmake --build --preset release --target measure_prediction`). What is not there is left out, and
-said. Predictions begin at every third frame; all methods see the same frames.
+Needs clips of `export.clips` (.data/clips/pushing/val), those of `export.photos` (.data/photos/clip), and the programs
+measure_prediction and find_motion (`cmake --build --preset release --target measure_prediction find_motion`). What is
+not there is left out, and said. Predictions begin at every third frame; all methods see the same frames.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ from tqdm import tqdm
 
 from benchmarks import drawn, gaps
 from benchmarks.drawn.tables import drawn_tables
+from benchmarks.foreseen import motion_error
+from benchmarks.foreseen.dis import Dis
+from benchmarks.foreseen.structure import structure_of
 from benchmarks.gaps import FIRST_START, START_STEP, psnr_db
 from export.clips.clip import read_clip
 
@@ -72,11 +76,16 @@ def measure(
     pushing = clip_films(clips, 3 if quick else 24)
     if not pushing:
         absent.append(f"pushing ({clips} has none: python -m export.clips.dataset pushing --split val --clips 16)")
-    rows = [measure_film(film, threads) for film in tqdm([*films, *pushing], desc="prediction", disable=None)]
+    rows = [
+        measure_film(film, threads, has_ssim=True) for film in tqdm([*films, *pushing], desc="prediction", disable=None)
+    ]
     large = [film for film in real_films(photos, LARGE_PX, quick=True) if film.bgr.shape[1:3] == LARGE_PX[::-1]]
     speed = [measure_film(film, count) for film in large[:1] for count in (1, threads)]
     waits = json.loads(run(["waits", "6" if quick else "30", WAIT_SOURCE]))
     document = {"rows": rows, "sets": means_of(rows), "speed": speed, "waits": waits, "missing": absent, "warnings": []}
+    if pushing:
+        paths = sorted(clips.glob("clip-*.npz"))[: 3 if quick else 24]
+        document["motion_error_px"] = motion_error.measure(paths)
     surprise = frames_a_second(BUNDLE, threads, 60 if quick else 200)
     document["surprise"] = surprise
     figures = {
@@ -158,7 +167,7 @@ def clip_films(folder: Path, most: int) -> list[Film]:
     return films
 
 
-def measure_film(film: Film, threads: int) -> dict:
+def measure_film(film: Film, threads: int, has_ssim: bool = False) -> dict:
     frames = np.ascontiguousarray(film.bgr)
     height, width = frames.shape[1:3]
     words = ["errors", str(width), str(height), str(film.fps), str(threads), *map(str, HORIZONS)]
@@ -166,23 +175,24 @@ def measure_film(film: Film, threads: int) -> dict:
     dis, dis_ms = dis_errors(frames)
     for row in found["horizons"]:
         row["dis_db"] = dis[row["frames"]]
+    if has_ssim:
+        for name, values in structure_of(frames, film.fps, HORIZONS, threads).items():
+            for row, value in zip(found["horizons"], values, strict=True):
+                row[f"{name}_ssim"] = value
     return {"film": film.name, "size_px": [width, height], "threads": threads, "dis_ms": dis_ms, **found}
 
 
 def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
     """Constant velocity by OpenCV's DIS (preset medium), fetched backward: PSNR by horizon, and milliseconds of motion
     and one picture, on OpenCV's own threads."""
-    dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    y, x = np.mgrid[: frames.shape[1], : frames.shape[2]].astype(np.float32)
+    dis = Dis(*frames.shape[1:3])
     errors: dict[int, list[float]] = {horizon: [] for horizon in HORIZONS}
     times = []
     for start in range(FIRST_START, len(frames) - max(HORIZONS), START_STEP):
         begin = time.perf_counter()
-        now, before = (cv2.cvtColor(frames[i], cv2.COLOR_BGR2GRAY) for i in (start, start - 1))
-        flow = dis.calc(now, before, None)
+        to_before = dis.motion(frames[start], frames[start - 1])
         for horizon in HORIZONS:
-            moved = cv2.remap(frames[start], x + horizon * flow[..., 0], y + horizon * flow[..., 1], cv2.INTER_LINEAR,
-                              borderMode=cv2.BORDER_REPLICATE)  # fmt: skip
+            moved = dis.moved(frames[start], to_before, horizon)
             if horizon == HORIZONS[0]:
                 times.append(1000 * (time.perf_counter() - begin))
             errors[horizon].append(psnr_db(moved, frames[start + horizon]))
@@ -203,15 +213,30 @@ def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, 
 
 
 def means_of(rows: list[dict]) -> dict[str, dict]:
-    """Of pushing and of the real clips: PSNR by method and horizon, means over clips."""
+    """Of pushing and of the real clips: PSNR and SSIM by method and horizon, means over clips."""
     sets = {"pushing": [row for row in rows if row["film"].startswith("pushing")],
             "real": [row for row in rows if not row["film"].startswith("pushing")]}  # fmt: skip
     return {
         name: {"clips": len(of_set),
-               **{method: [float(np.mean([row["horizons"][i][f"{method}_db"] for row in of_set]))
-                           for i in range(len(HORIZONS))] for method in METHODS}}
+               **{method: mean_by_horizon(of_set, f"{method}_db") for method in METHODS},
+               "ssim": {method: mean_by_horizon(of_set, f"{method}_ssim") for method in METHODS
+                        if f"{method}_ssim" in of_set[0]["horizons"][0]}}
         for name, of_set in sets.items() if of_set
     }  # fmt: skip
+
+
+def mean_by_horizon(rows: list[dict], key: str) -> list[float]:
+    return [float(np.mean([row["horizons"][i][key] for row in rows])) for i in range(len(HORIZONS))]
+
+
+def ssim_table(sets: dict[str, dict]) -> list[list[str]]:
+    """A head and a row a set: SSIM by method and frames ahead; nothing of sets that were measured without."""
+    table = [["clips, SSIM", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values())]]
+    for name, means in sets.items():
+        if means.get("ssim"):
+            cells = [f"{means['ssim'][method][i]:.3f}" for i in range(len(HORIZONS)) for method in METHODS]
+            table.append([f"mean of {means['clips']} ({name})", *cells])
+    return table
 
 
 def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
@@ -236,6 +261,18 @@ def section(measured: dict) -> tuple[str, list]:
         "Motion: ours; OpenCV DIS: constant velocity by its preset medium; auto: what an app gets without an option.",
         table_of([], measured["sets"]) if measured["sets"] else "No clip was there.",
     ]
+    structure = ssim_table(measured["sets"])
+    parts += [structure] if len(structure) > 1 else []
+    errors = measured.get("motion_error_px", {})  # a report measured before has none
+    if "motion" in errors:
+        parts.append(
+            f"Motion from frame to frame of {errors['clips']} of pushing, where things move (by "
+            f"{motion_error.MIN_MOTION_PX} pixels and more) and stay visible: endpoint error in pixels of 320 x 240, "
+            "mean and median of a clip: "
+            + ", ".join(f"{says} {errors[name][0]:.2f} and {errors[name][1]:.2f}"
+                        for name, says in motion_error.METHODS.items())
+            + "."
+        )  # fmt: skip
     rows = [
         [
             "640 x 480, ms",

@@ -18,6 +18,7 @@ from export.prediction.pictures.train_convolutional import load_convolutional
 
 GIVEN, MADE = 5, 11  # frames of a clip, as the published system has them
 SAMPLES = 16
+PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # of what is drawn with few samples; 1 has SAMPLES
 DRAWN = 3  # MAQ_NETWORK_DRAWN
 SEED = 1
 CONVOLUTIONAL = "convolutional"
@@ -87,9 +88,8 @@ def methods(bundle: Path, samples: int, weights: Path | None = None) -> dict[str
         "auto": foreseen("auto"),
         "likeliest": drawn(1, bundle, temperature=0),
         "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
-        "likeliest, 4 passes": drawn(1, bundle, temperature=0, passes=4),
-        "temperature 0.25": drawn(4, bundle, temperature=0.25),
-        "temperature 0.5": drawn(4, bundle, temperature=0.5),
+        **{f"likeliest, {passes} passes": drawn(1, bundle, temperature=0, passes=passes) for passes in PASSES},
+        **{f"temperature {value:g}": drawn(4, bundle, temperature=value) for value in TEMPERATURES},
         "temperature 1": drawn(samples, bundle, temperature=1),
     }
 

@@ -34,18 +34,16 @@ int squares_of_run(const uint8_t* __restrict one, const uint8_t* __restrict othe
 void thin_out(const FlowField& flow, int step, FlowField& thin) {
   thin.resize(divide_up(flow.width_px, step), divide_up(flow.height_px, step));
   const float factor = 0.25f / float(step);
-  for (int y = 0; y < thin.height_px; ++y) {
-    const int lower = std::min(y * step + step / 2, flow.height_px - 1), upper = std::max(lower - 1, y * step);
-    for (int x = 0; x < thin.width_px; ++x) {
-      const int right = std::min(x * step + step / 2, flow.width_px - 1), left = std::max(right - 1, x * step);
-      const auto mean = [&](const std::vector<float>& of) {
-        const float* const above = of.data() + size_t(upper) * size_t(flow.width_px);
-        const float* const below = of.data() + size_t(lower) * size_t(flow.width_px);
-        return (above[left] + above[right] + (below[left] + below[right])) * factor;
-      };
-      const size_t at = size_t(y) * size_t(thin.width_px) + size_t(x);
-      thin.dx_px[at] = mean(flow.dx_px);
-      thin.dy_px[at] = mean(flow.dy_px);
+  for (const auto& [from, to] : {std::pair{&flow.dx_px, &thin.dx_px}, {&flow.dy_px, &thin.dy_px}}) {
+    float* value = to->data();
+    for (int y = 0; y < thin.height_px; ++y) {
+      const int lower = std::min(y * step + step / 2, flow.height_px - 1), upper = std::max(lower - 1, y * step);
+      const float* const above = from->data() + size_t(upper) * size_t(flow.width_px);
+      const float* const below = from->data() + size_t(lower) * size_t(flow.width_px);
+      for (int x = 0; x < thin.width_px; ++x) {
+        const int right = std::min(x * step + step / 2, flow.width_px - 1), left = std::max(right - 1, x * step);
+        *value++ = (above[left] + above[right] + (below[left] + below[right])) * factor;
+      }
     }
   }
 }
@@ -113,10 +111,13 @@ void MethodWeights::take(const Horizon& horizon, const Past& now, const uint8_t*
 size_t MethodWeights::redundant_frame(int64_t now_ns) const {
   const auto age_ns = [&](size_t index) { return double(now_ns - past_[index].timestamp_ns); };
   if (age_ns(kFrames - 1) > kMaxRatio * double(horizons_.back().ahead_ns)) return kFrames - 1;
-  size_t found = 1;
-  const auto without = [&](size_t index) { return age_ns(index + 1) / age_ns(index - 1); };
-  for (size_t i = 2; i + 1 < kFrames; ++i) {
-    if (without(i) < without(found)) found = i;
+  size_t found = 0;
+  double smallest = 0;
+  for (size_t i = 1; i + 1 < kFrames; ++i) {
+    const double without = age_ns(i + 1) / age_ns(i - 1);
+    if (found != 0 && without >= smallest) continue;
+    found = i;
+    smallest = without;
   }
   return found;
 }

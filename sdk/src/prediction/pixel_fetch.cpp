@@ -106,26 +106,23 @@ inline uint8_t mix(uint8_t one, uint8_t other, int weight) {
   return uint8_t((one * (256 - weight) + other * weight + 128) >> 8);
 }
 
-// Of a run of pixels without gaps.
-template <int kChannels>
-void mix_packed(const uint8_t* __restrict from, uint8_t* __restrict to, const float* __restrict weights, int count) {
-  for (int x = 0; x < count; ++x) {
-    const int weight = int(weights[x] + 0.5f);
-    for (int c = 0; c < kChannels; ++c) {
-      const int at = x * kChannels + c;
-      to[at] = mix(from[at], to[at], weight);
-    }
+// Weights by byte, of 256.
+void mix_bytes(const uint8_t* __restrict from, uint8_t* __restrict to, const uint16_t* __restrict weights, int count) {
+  for (int i = 0; i < count; ++i) {
+    to[i] = uint8_t(uint16_t(from[i] * (256 - weights[i]) + to[i] * weights[i] + 128) >> 8);
   }
 }
 
-void mix_run(const PlaneSamples& plane, const uint8_t* from, uint8_t* to, const float* weights, int count) {
+void mix_run(const PlaneSamples& plane, const uint8_t* from, uint8_t* to, const float* weights, int count,
+             std::vector<uint16_t>& of_bytes) {
   if (plane.channels * plane.channel_bytes == plane.pixel_bytes) {
-    switch (plane.channels) {
-      case 1: return mix_packed<1>(from, to, weights, count);
-      case 2: return mix_packed<2>(from, to, weights, count);
-      case 3: return mix_packed<3>(from, to, weights, count);
-      default: return mix_packed<4>(from, to, weights, count);
+    of_bytes.resize(size_t(count) * size_t(plane.channels));
+    uint16_t* next = of_bytes.data();
+    for (int x = 0; x < count; ++x) {
+      const auto weight = uint16_t(weights[x] + 0.5f);
+      for (int channel = 0; channel < plane.channels; ++channel) *next++ = weight;
     }
+    return mix_bytes(from, to, of_bytes.data(), int(of_bytes.size()));
   }
   for (int x = 0; x < count; ++x) {
     const int weight = int(weights[x] + 0.5f);
@@ -188,7 +185,7 @@ void mix_row(const PlaneSamples& plane, const CellWeights& weights, int scale, i
   if (std::all_of(row.cell_weights.begin(), row.cell_weights.end(), is_all)) return;
   stretch_row(row.cell_weights.data(), weights.columns, step_x, plane.width, row.weights.data());
   mix_run(plane, plane.from + size_t(y) * plane.from_stride, plane.to + size_t(y) * plane.to_stride, row.weights.data(),
-          plane.width);
+          plane.width, row.byte_weights);
 }
 
 }  // namespace maq

@@ -25,6 +25,7 @@ struct FetchRow {
   std::vector<float> dx, dy;
   std::vector<int> left, right, x_weight, above, below, y_weight;
   std::vector<float> cell_weights, weights;  // between two rows of cells; of each pixel, of 256
+  std::vector<uint16_t> byte_weights;
 };
 
 // Row `y` of a plane, along a field whose pixels are `scale` pixels of the frame each way. A byte behind the last of

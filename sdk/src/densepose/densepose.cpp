@@ -35,66 +35,6 @@ constexpr float kMaxLostConfidence = 0.1f;
 // kMaxGainedOdds, would not be shown. Chosen on renderings and photographs of the validation split.
 constexpr float kNeutralConfidence = 0.4f, kMaxGainedOdds = 3.5f;
 
-// Names of tensors at the levels from `first` to `last`: "p3", "p4", …
-std::vector<std::string> at_levels(const std::string& name, int first, int last) {
-  std::vector<std::string> all;
-  for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
-  return all;
-}
-
-// Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
-std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
-                              const std::string& where) {
-  std::vector<TensorSpec> chosen;
-  for (const std::string& name : names) {
-    const auto found =
-        std::find_if(tensors.begin(), tensors.end(), [&](const TensorSpec& tensor) { return tensor.name == name; });
-    if (found == tensors.end()) throw Error(MAQ_ERROR_BAD_BUNDLE, where, " ", name, ". Export the bundle again.");
-    chosen.push_back(*found);
-  }
-  return chosen;
-}
-
-GraphSpec graph_with(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& inputs,
-                     const std::vector<std::string>& outputs) {
-  const std::string where = concatenate("Bundle ", manifest.name, ": graph ", graph, " lists no ");
-  const GraphSpec& listed = manifest.graphs.at(graph);
-  return {listed.file, named(listed.inputs, inputs, where + "input"), named(listed.outputs, outputs, where + "output")};
-}
-
-// Of P2, and so of all levels.
-int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
-  const std::vector<Dimension>& shape = trunk.outputs[0].shape;
-  const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[3]) : nullptr;
-  if (channels == nullptr) {
-    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle_name,
-                ": output p2 of the trunk must have the shape [1, h, w, channels] with a number of channels. "
-                "Export the bundle again.");
-  }
-  return int(*channels);
-}
-
-constexpr int64_t kAnySize = -1;
-
-// Throws unless the manifest gives a tensor of `graph` a shape that the runtime will use. Where it has a name for a
-// size that must be known, the tensor gets the number, so that Session compares it with the graph.
-void require_shape(TensorSpec& tensor, const std::vector<int64_t>& shape, const std::string& where) {
-  const auto fail = [&] {
-    std::string text;
-    for (const int64_t size : shape)
-      text += (text.empty() ? "" : ", ") + (size == kAnySize ? "n" : std::to_string(size));
-    throw Error(MAQ_ERROR_BAD_BUNDLE, where, tensor.name, " must have the shape [", text,
-                "] by the manifest's other values, but its graph lists another. Export the bundle again.");
-  };
-  if (tensor.shape.size() != shape.size()) fail();
-  for (size_t axis = 0; axis < shape.size(); ++axis) {
-    if (shape[axis] == kAnySize) continue;
-    const int64_t* listed = std::get_if<int64_t>(&tensor.shape[axis]);
-    if (listed != nullptr && *listed != shape[axis]) fail();
-    tensor.shape[axis] = shape[axis];
-  }
-}
-
 // Settings with the bundle's values in place of zeros.
 DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec) {
   if (settings.long_side_px == 0) settings.long_side_px = spec.long_side_px;
@@ -149,11 +89,7 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   // A graph, whose inputs and outputs have these shapes.
   const auto make_checked = [&](const std::string& name, GraphSpec graph, const std::vector<int64_t>& input,
                                 const std::vector<std::vector<int64_t>>& outputs, const SessionSettings& with) {
-    const std::string where = concatenate("Bundle ", manifest.name, ": graph ", name, ": ");
-    for (TensorSpec& tensor : graph.inputs) require_shape(tensor, input, where + "input ");
-    for (size_t i = 0; i < graph.outputs.size(); ++i) {
-      require_shape(graph.outputs[i], outputs[std::min(i, outputs.size() - 1)], where + "output ");
-    }
+    require_shapes(graph, input, outputs, concatenate("Bundle ", manifest.name, ": graph ", name, ": "));
     return std::make_unique<Session>(runtime, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), with);
   };
   const std::vector<int64_t> features = {1, kAnySize, kAnySize, channels_};
@@ -237,7 +173,7 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   stats.key_frame = !is_same_stream || frames_since_key_ == 0;
   frames_since_key_ = stats.key_frame ? 1 : frames_since_key_ + 1;
   if (frames_since_key_ >= settings_.key_frame_interval) frames_since_key_ = 0;
-  seen_ = input_of(image, roll_steps);
+  seen_ = rotated_input(image.width_px, image.height_px, settings_.long_side_px, roll_steps);
   stats.threads = settings_.threads;
   stats.is_threads_measured = measures_threads_;
   stats.network_width_px = seen_.size.width_px;
@@ -255,32 +191,6 @@ void DensePose::find_people(const ImageView& image, DensePoseResult& result) {
   }
   paint_people(result);
   stats.total_ms = float(total.lap_ms());
-}
-
-DensePose::ImageInput DensePose::input_of(const ImageView& image, int roll_steps) const {
-  ImageInput input;
-  input.roll_steps = roll_steps;
-  input.size = network_size(image.width_px, image.height_px, settings_.long_side_px);
-  input.to_image.xx = double(image.width_px) / input.size.width_px;
-  input.to_image.yy = double(image.height_px) / input.size.height_px;
-  if (roll_steps == 0) return input;
-  // Around the whole image, at the scale of one that is not rotated.
-  const double angle = roll_steps * kRollStepRad;
-  const double cos = std::cos(angle), sin = std::sin(angle);
-  const double scale = settings_.long_side_px / double(std::max(image.width_px, image.height_px));
-  const auto side = [&](double along, double across) {
-    return std::max(1, int(std::ceil(scale * (along * std::abs(cos) + across * std::abs(sin)) - 1e-6)));
-  };
-  input.size = {side(image.width_px, image.height_px), side(image.height_px, image.width_px)};
-  AffineMap& map = input.to_image;
-  map.xx = map.yy = cos / scale;
-  map.xy = -sin / scale;
-  map.yx = sin / scale;
-  const double middle_x = input.size.width_px / 2.0, middle_y = input.size.height_px / 2.0;
-  map.shift_x = image.width_px / 2.0 - map.xx * middle_x - map.xy * middle_y;
-  map.shift_y = image.height_px / 2.0 - map.yx * middle_x - map.yy * middle_y;
-  input.up = {sin, -cos};
-  return input;
 }
 
 void DensePose::find_boxes(const ImageView& image, DensePoseStats& stats) {

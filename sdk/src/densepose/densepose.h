@@ -15,6 +15,7 @@
 #include "densepose/person_crop.h"
 #include "densepose/proposals.h"
 #include "densepose/roi_align.h"
+#include "densepose/rotated_input.h"
 #include "densepose/surface_grid.h"
 #include "image/crop_input.h"
 #include "image/network_input.h"
@@ -23,9 +24,6 @@
 #include "nn/sized_sessions.h"
 
 namespace maq {
-
-// Networks lose little by half of it; smaller steps would begin key frames more often.
-constexpr double kRollStepRad = 15 * 3.14159265358979323846 / 180;
 
 enum class PersonCrops { kOff, kAuto, kAll };  // as maq_person_crops
 
@@ -125,14 +123,6 @@ class DensePose {
     ChartPredictor* charts = nullptr;  // of that dense head
   };
 
-  // How the networks see the image.
-  struct ImageInput {
-    NetworkSize size;    // without padding
-    AffineMap to_image;  // from pixels of the input
-    int roll_steps = 0;  // of kRollStepRad, by which the image was rotated
-    Point up{0, -1};     // in the image, a unit vector
-  };
-
   // What maps the surface, of whole images or of crops.
   struct Mapper {
     Session* trunk = nullptr;
@@ -143,8 +133,6 @@ class DensePose {
   };
 
   void find_people(const ImageView& image, DensePoseResult& result);
-  // The whole image at the settings' size, rotated upright by that many steps of its roll.
-  ImageInput input_of(const ImageView& image, int roll_steps) const;
   // Of the trunk's outputs for such an input, into `shapes_`; of one that gives all levels the evidence, too.
   void set_level_shapes(int width_px, int height_px, size_t levels);
   // How many threads the trunk, which takes the longest, is fastest on.
@@ -205,7 +193,7 @@ class DensePose {
   Mapper whole_, crops_;
   BodySurface surface_;
   std::atomic<float> roll_rad_{0};
-  ImageInput seen_;  // of the image before, while none is run
+  RotatedInput seen_;  // of the image before, while none is run
   NetworkInput input_;
   std::vector<TensorView> pyramid_;   // P2 to P6, or P2, in memory of a trunk
   std::vector<FeatureMap> features_;  // the same, without P6

@@ -64,6 +64,36 @@ DenseHeadSpec read_dense_head(const ManifestNode& node) {
   return head;
 }
 
+// Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
+std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
+                              const std::string& where) {
+  std::vector<TensorSpec> chosen;
+  for (const std::string& name : names) {
+    const auto found =
+        std::find_if(tensors.begin(), tensors.end(), [&](const TensorSpec& tensor) { return tensor.name == name; });
+    if (found == tensors.end()) throw Error(MAQ_ERROR_BAD_BUNDLE, where, " ", name, ". Export the bundle again.");
+    chosen.push_back(*found);
+  }
+  return chosen;
+}
+
+void require_shape(TensorSpec& tensor, const std::vector<int64_t>& shape, const std::string& where) {
+  const auto fail = [&] {
+    std::string text;
+    for (const int64_t size : shape)
+      text += (text.empty() ? "" : ", ") + (size == kAnySize ? "n" : std::to_string(size));
+    throw Error(MAQ_ERROR_BAD_BUNDLE, where, tensor.name, " must have the shape [", text,
+                "] by the manifest's other values, but its graph lists another. Export the bundle again.");
+  };
+  if (tensor.shape.size() != shape.size()) fail();
+  for (size_t axis = 0; axis < shape.size(); ++axis) {
+    if (shape[axis] == kAnySize) continue;
+    const int64_t* listed = std::get_if<int64_t>(&tensor.shape[axis]);
+    if (listed != nullptr && *listed != shape[axis]) fail();
+    tensor.shape[axis] = shape[axis];
+  }
+}
+
 }  // namespace
 
 DensePoseSpec read_densepose_spec(const Manifest& manifest) {
@@ -84,6 +114,38 @@ DensePoseSpec read_densepose_spec(const Manifest& manifest) {
     spec.crop_charts_file = manifest.listed_file(charts->at("file"));
   }
   return spec;
+}
+
+std::vector<std::string> at_levels(const std::string& name, int first, int last) {
+  std::vector<std::string> all;
+  for (int level = first; level <= last; ++level) all.push_back(name + std::to_string(level));
+  return all;
+}
+
+GraphSpec graph_with(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& inputs,
+                     const std::vector<std::string>& outputs) {
+  const std::string where = concatenate("Bundle ", manifest.name, ": graph ", graph, " lists no ");
+  const GraphSpec& listed = manifest.graphs.at(graph);
+  return {listed.file, named(listed.inputs, inputs, where + "input"), named(listed.outputs, outputs, where + "output")};
+}
+
+int feature_channels(const GraphSpec& trunk, const std::string& bundle_name) {
+  const std::vector<Dimension>& shape = trunk.outputs[0].shape;
+  const int64_t* channels = shape.size() == 4 ? std::get_if<int64_t>(&shape[3]) : nullptr;
+  if (channels == nullptr) {
+    throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle_name,
+                ": output p2 of the trunk must have the shape [1, h, w, channels] with a number of channels. "
+                "Export the bundle again.");
+  }
+  return int(*channels);
+}
+
+void require_shapes(GraphSpec& graph, const std::vector<int64_t>& input,
+                    const std::vector<std::vector<int64_t>>& outputs, const std::string& where) {
+  for (TensorSpec& tensor : graph.inputs) require_shape(tensor, input, where + "input ");
+  for (size_t i = 0; i < graph.outputs.size(); ++i) {
+    require_shape(graph.outputs[i], outputs[std::min(i, outputs.size() - 1)], where + "output ");
+  }
 }
 
 }  // namespace maq

@@ -1,5 +1,10 @@
 #include "densepose/manifest.h"
 
+#include <algorithm>
+#include <variant>
+
+#include "core/error.h"
+
 namespace maq {
 namespace {
 

@@ -120,6 +120,7 @@ FOREIGN = {
 
 # Units under 60 lines that one other unit uses, each with its reason to be one.
 DEFENDED = {
+    "densepose/rotated_input": "geometry with a test of its own",
     "head/fit/adam": "an algorithm of the literature, with a test of its own",
     "head/fit/pose_rays": "geometry with a test of its own, against finite differences",
     "prediction/transformer/philox": "an algorithm of the literature with a test of its own",

@@ -74,8 +74,8 @@ void MethodWeights::reset() {
 }
 
 // Into `errors`, a running mean of those so far. Each cell is judged together with those around it.
-void MethodWeights::take(const Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& latest,
-                         std::vector<float>& errors) const {
+void MethodWeights::take(const Horizon& horizon, const PastFrame& now, const uint8_t* predicted,
+                         std::vector<float>& latest, std::vector<float>& errors) const {
   latest.assign(size_t(columns_) * size_t(rows_), 0.0f);
   errors.resize(latest.size());
   const size_t width = size_t(now.width_px);
@@ -122,11 +122,11 @@ size_t MethodWeights::redundant_frame(int64_t now_ns) const {
   return found;
 }
 
-void MethodWeights::judge(Horizon& horizon, const Past& now, MethodJudge& judge) const {
-  const Past* nearest = nullptr;
+void MethodWeights::judge(Horizon& horizon, const PastFrame& now, MethodJudge& judge) const {
+  const PastFrame* nearest = nullptr;
   for (size_t i = 0; i < count_; ++i) {
-    const Past& past = past_[i];
-    const auto away = [&](const Past& of) { return ratio(now.timestamp_ns - of.timestamp_ns, horizon.ahead_ns); };
+    const PastFrame& past = past_[i];
+    const auto away = [&](const PastFrame& of) { return ratio(now.timestamp_ns - of.timestamp_ns, horizon.ahead_ns); };
     if (past.interval_ns > 0 && (nearest == nullptr || away(past) < away(*nearest))) nearest = &past;
   }
   if (nearest == nullptr || ratio(now.timestamp_ns - nearest->timestamp_ns, horizon.ahead_ns) > kMaxRatio) return;
@@ -147,15 +147,15 @@ void MethodWeights::judge(Horizon& horizon, const Past& now, MethodJudge& judge)
 }
 
 void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
-                        WorkerThreads& threads, MethodJudges& judges) {
+                        WorkerThreads& threads, MethodWorkspace& work) {
   // At half the size of the flow: it tells the methods apart, in a quarter of the time.
   const GreyLevel& level = pyramid.level(pyramid.level_count() > 1 ? 1 : 0);
   const int step = pyramid.level_count() > 1 ? 2 : 1;
   columns_ = divide_up(level.width_px, kCell_px);
   rows_ = divide_up(level.height_px, kCell_px);
   cell_px_ = step * kCell_px;
-  FlowField& thin = judges[0].flow;
-  Past& now = past_.back();
+  FlowField& thin = work.judges[0].flow;
+  PastFrame& now = work.now;
   now.timestamp_ns = timestamp_ns;
   now.interval_ns = interval_ns;
   now.width_px = level.width_px;
@@ -171,11 +171,11 @@ void MethodWeights::add(const GreyPyramid& pyramid, int64_t timestamp_ns, const 
     thin_out(flow, step * kFlowStep, thin);
     now.moves = now.flow.pack(thin);
   }
-  threads.run(kHorizons, [&](size_t i, int) { judge(horizons_[i], now, judges[i]); });
+  threads.run(kHorizons, [&](size_t i, int) { judge(horizons_[i], now, work.judges[i]); });
   // At more than 32 frames a second not each is remembered, so that they reach back far enough.
   if (count_ > 0 && timestamp_ns - past_[0].timestamp_ns < kMinStep_ns) return;
   size_t at = count_ < kFrames ? count_++ : redundant_frame(timestamp_ns);
-  std::swap(past_[at], past_.back());
+  past_[at] = now;
   for (; at > 0; --at) std::swap(past_[at], past_[at - 1]);
 }
 

@@ -14,7 +14,16 @@
 
 namespace maq {
 
-// What judging by one horizon takes of memory; not needed afterwards.
+// What is remembered of a frame.
+struct PastFrame {
+  int64_t timestamp_ns = 0, interval_ns = 0;
+  int width_px = 0, height_px = 0;
+  std::vector<uint8_t> grey;  // and a byte
+  PackedFlow flow;            // at half the size of `grey`
+  bool moves = false;
+};
+
+// What judging by one horizon takes of memory.
 struct MethodJudge {
   FlowField flow;
   Extrapolation extrapolation;
@@ -22,8 +31,14 @@ struct MethodJudge {
   std::vector<float> latest;  // of each cell: mean square of the differences
   WorkerThreads alone{1};
 };
-inline constexpr size_t kMethodHorizons = 5;
-using MethodJudges = std::array<MethodJudge, kMethodHorizons>;
+
+// What judging takes of memory, of which nothing is needed afterwards.
+struct MethodWorkspace {
+  static constexpr size_t kHorizons = 5;
+
+  PastFrame now;
+  std::array<MethodJudge, kHorizons> judges;
+};
 
 class MethodWeights {
  public:
@@ -36,22 +51,14 @@ class MethodWeights {
   // `interval_ns`, of the pyramid's finest level; 0: none is known, as of a stream's first frame. Takes nothing from
   // the heap once a dozen frames of a size have come.
   void add(const GreyPyramid& pyramid, int64_t timestamp_ns, const FlowField& flow, int64_t interval_ns,
-           WorkerThreads& threads, MethodJudges& judges);
+           WorkerThreads& threads, MethodWorkspace& work);
 
   // How much of each place is motion's, the rest being the last frame's, by their errors there at the horizon nearest
   // to that. Of none where nothing is known yet. Stays until the next call.
   const CellWeights& at(int64_t ahead_ns);
 
  private:
-  static constexpr size_t kHorizons = kMethodHorizons, kFrames = 8;
-
-  struct Past {
-    int64_t timestamp_ns = 0, interval_ns = 0;
-    int width_px = 0, height_px = 0;
-    std::vector<uint8_t> grey;  // and a byte
-    PackedFlow flow;            // at half the size of `grey`
-    bool moves = false;
-  };
+  static constexpr size_t kHorizons = MethodWorkspace::kHorizons, kFrames = 8;
 
   // Of each cell: logarithms of the mean squares of the differences of brightness, in a mean in which later frames
   // count more: a moment in which everything was wrong must not outweigh many.
@@ -62,14 +69,13 @@ class MethodWeights {
   };
 
   size_t redundant_frame(int64_t now_ns) const;
-  void judge(Horizon& horizon, const Past& now, MethodJudge& judge) const;
-  void take(const Horizon& horizon, const Past& now, const uint8_t* predicted, std::vector<float>& latest,
+  void judge(Horizon& horizon, const PastFrame& now, MethodJudge& judge) const;
+  void take(const Horizon& horizon, const PastFrame& now, const uint8_t* predicted, std::vector<float>& latest,
             std::vector<float>& errors) const;
 
   std::array<Horizon, kHorizons> horizons_;
-  // Those that are remembered, the newest first, and last of all room for another.
-  std::array<Past, kFrames + 1> past_;
-  size_t count_ = 0;
+  std::array<PastFrame, kFrames> past_;       // the newest first
+  size_t count_ = 0;                          // of those that are known
   int columns_ = 0, rows_ = 0, cell_px_ = 0;  // of cells; cell_px_ in pixels of the flow
   CellWeights weights_;
 };

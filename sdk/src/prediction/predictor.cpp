@@ -109,7 +109,7 @@ void Predictor::follow() {
     }
     stats_.flow_ms = float(stage.lap_ms());
     if (settings_.method == MAQ_PREDICTION_AUTO && !is_again_) {
-      method_weights_.add(work->now, newest_.timestamp_ns, work->flow, interval_ns_, threads_, work->judges);
+      method_weights_.add(work->now, newest_.timestamp_ns, work->flow, interval_ns_, threads_, work->methods);
       stats_.choice_ms = float(stage.lap_ms());
     }
   }

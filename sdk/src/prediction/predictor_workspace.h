@@ -17,7 +17,7 @@ struct PredictorWorkspace {
   OpticalFlow optical_flow;
   FlowField flow;
   Extrapolation extrapolation;
-  MethodJudges judges;
+  MethodWorkspace methods;
   std::unique_ptr<PredictorWorkspace> next;  // while nothing works in it
 };
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 #include <random>
+#include <thread>
 
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
@@ -323,6 +324,27 @@ TEST(Predictor, PredictorsThatTakeTurnsInOneMemoryPredictAsThoseAlone) {
       EXPECT_EQ(stream.alone.moves(), i > 0);
     }
   }
+}
+
+TEST(Predictor, ThreadsShareAMemoryWithoutHarm) {
+  const auto shared = std::make_shared<maq::PredictorWorkspaces>();
+  const auto stream = [](const std::shared_ptr<maq::PredictorWorkspaces>& workspaces, double dx) {
+    maq::Predictor predictor({MAQ_PREDICTION_AUTO, 1, workspaces});
+    std::vector<uint8_t> all;
+    maq::Frame predicted;
+    for (int i = 0; i < 8; ++i) {
+      predictor.push(moving_texture::frame(MAQ_PIXEL_GREY8, 96, 64, dx * i, i, i * kFrame_ns));
+      predictor.predict(2 * kFrame_ns, predicted);
+      const std::vector<uint8_t> pixels = pixels_of(predicted);
+      all.insert(all.end(), pixels.begin(), pixels.end());
+    }
+    return all;
+  };
+  std::vector<uint8_t> found[3];
+  std::vector<std::thread> threads;
+  for (int k = 0; k < 3; ++k) threads.emplace_back([&, k] { found[k] = stream(shared, k - 0.5); });
+  for (std::thread& thread : threads) thread.join();
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(found[k], stream(nullptr, k - 0.5)) << k;
 }
 
 TEST(Predictor, AFurtherOneKeepsLessThanTwoMegabytes) {

@@ -2,7 +2,7 @@
 behind it is, run times, how long a concealer's frames are waited for and how near the truth they are; how long surprise
 takes.
 
-    python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (12 minutes)
+    python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (14 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
     python -m benchmarks --only prediction                  the same as a part of the report
 

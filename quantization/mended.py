@@ -1,4 +1,4 @@
-"""What the network that mends motion's pictures is given of clips, to calibrate its int8 graph and to measure it."""
+"""What the network that mends what is foreseen is given of clips, to calibrate its int8 graph and to measure it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import torch
 
 from export.densepose.graphs import session
-from export.prediction.data import read_clips
-from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
+from export.prediction.motion_pictures import HORIZONS
 from export.prediction.parallel import times_ahead
+from export.prediction.pictures.foreseen import read_foreseen
 from export.prediction.pictures.mended_graph import MENDED
 from export.prediction.pictures.picture_error import psnr_db
 from quantization.samples import Sample
@@ -20,9 +20,10 @@ from quantization.samples import Sample
 def mended_samples(
     data: Path, sets: Sequence[str], split: str, count: int, before: int
 ) -> tuple[list[Sample], np.ndarray]:
-    """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. Needs the
-    SDK's library, for motion."""
-    clips = read_clips(data, list(sets), split)
+    """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. data: what
+    `export.prediction.pictures.foreseen` wrote. Raises SystemExit where there is nothing."""
+    known = read_foreseen(data, list(sets), split)
+    clips = known.clips
     total = clips.frames.shape[1]
     samples: list[Sample] = []
     truth = []
@@ -30,9 +31,10 @@ def mended_samples(
         clip, h = k * len(clips) // count, k % len(HORIZONS)
         frames, fps = clips.frames[clip], clips.fps[clip]
         now = before - 1 + (7 * k) % (total - before - HORIZONS[h])
-        moved = motion_pictures(MotionJob(clip, frames[: now + 1 + HORIZONS[h]].numpy(), float(fps)))[now, h]
-        pictures = np.concatenate([*frames[now + 1 - before : now + 1].numpy(), moved], -1)[None].astype(np.float32)
-        samples.append({"pictures": pictures, "times": times_ahead(fps[None], torch.tensor([HORIZONS[h]])).numpy()})
+        shown = torch.cat([*frames[now + 1 - before : now + 1], known.pictures[clip, now, h]], -1)[None].float()
+        samples.append(
+            {"pictures": shown.numpy(), "times": times_ahead(fps[None], torch.tensor([HORIZONS[h]])).numpy()}
+        )
         truth.append(frames[now + HORIZONS[h]].numpy())
     return samples, np.stack(truth)
 

@@ -91,7 +91,7 @@ def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings
     if (options.fp32 / f"{MENDED}.onnx").exists():
         before = read_manifest(options.fp32)[MENDED]["before"]
         for own, split, count in zip(given, ("train", "val"), (settings.frames, settings.held_out_frames), strict=True):
-            own[MENDED], truth = mended_samples(options.data, options.sets, split, count, before)
+            own[MENDED], truth = mended_samples(options.foreseen, options.foreseen_sets, split, count, before)
     graphs = {name: own for name, own in settings.graphs.items() if name in given[0]}
     quality = quantize_graphs(options.fp32, options.out, graphs, *given)
     measured = cost(options.fp32, options.out, held_out, codes)
@@ -122,6 +122,13 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--codes", type=Path, default=Path(".data/prediction"), help="of clips, for the transformer")
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
+    parser.add_argument(
+        "--foreseen",
+        type=Path,
+        default=Path(".data/prediction/foreseen"),
+        help="of clips (pictures.foreseen)",
+    )
+    parser.add_argument("--foreseen-sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
     parser.add_argument("--settings", type=Path, default=PREDICTION)
     parser.add_argument(
         "--keep", type=Path, metavar="DIR", help="int8 bundle of the same codes: its autoencoder is taken as it is"

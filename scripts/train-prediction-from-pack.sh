@@ -5,11 +5,11 @@
 #     scripts/train-prediction-from-pack.sh prediction.pack OUT
 #
 # Collages of its photographs are made first. Then the autoencoder, beside it the convolutional network; then codes; then
-# both transformers and the network that mends what motion predicts, at once. Weights (half precision, but for the
+# both transformers and the network that mends what `auto` foresees, at once. Weights (half precision, but for the
 # autoencoder), logs and curves are copied to OUT.
 #
 # Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the collages, the batches and
-# the validation (100), PROCESSES for motion (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
+# the validation (100), PROCESSES for motion and what is foreseen (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
 set -eu
 [ $# = 2 ] || { sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -44,13 +44,16 @@ convolutional=$!
 "$python" -m export.prediction.train_autoencoder --sets $sets --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
   --stills .data/backgrounds/train --validate-minutes 100
 keep prediction-autoencoder autoencoder
-"$python" -m export.prediction.codes --sets $sets --keep-pictures --processes "${PROCESSES:-5}"
+"$python" -m export.prediction.codes --sets $sets --processes "${PROCESSES:-5}"
+for split in train val; do
+  "$python" -m export.prediction.pictures.foreseen --sets $sets --split $split --processes "${PROCESSES:-5}"
+done
 minutes=$(spare 0.95)
 "$python" -m export.prediction.train_parallel --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --autoencoder "$autoencoder" --validate-frames "$(part 64)" --validate-minutes 3 >parallel.log 2>&1 &
 parallel=$!
-"$python" -m export.prediction.pictures.train_convolutional --sets $sets --motion .data/prediction --out .data/runs/prediction-mender \
-  --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
+"$python" -m export.prediction.pictures.train_convolutional --sets $sets --foreseen .data/prediction/foreseen \
+  --out .data/runs/prediction-mender --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
   >mender.log 2>&1 &
 mender=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \

@@ -32,14 +32,14 @@ MAKERS = {
 _MAX_S = 600
 
 
-def render(job: tuple[str, str, int, Path]) -> float:
-    """Writes one clip; returns the seconds that it took."""
-    kind, split, number, path = job
+def render(job: tuple[str, str, int, Path, bool]) -> float:
+    """Writes one clip, with frames of 320 x 240 or without; returns the seconds that it took."""
+    kind, split, number, path, large = job
     cv2.setNumThreads(1)
     begun = time.perf_counter()
     module, name = MAKERS[kind].split(":")
     make = getattr(importlib.import_module(module), name)
-    write_clip(make(split, number, large=split != "train"), path)
+    write_clip(make(split, number, large), path)
     return time.perf_counter() - begun
 
 
@@ -50,6 +50,7 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=100, help="default %(default)s")
     parser.add_argument("--first", type=int, default=0, help="number of the first clip (default %(default)s)")
     parser.add_argument("--out", type=Path, default=Path(".data/clips"))
+    parser.add_argument("--large", action="store_true", help="frames of 320 x 240 in clips to train on, too")
     Workers.add_arguments(parser)
     options = parser.parse_args()
     if options.clips < 1:
@@ -59,7 +60,8 @@ def main() -> None:
     folder = options.out / options.kind / options.split
     folder.mkdir(parents=True, exist_ok=True)
     numbers = range(options.first, options.first + options.clips)
-    jobs = [(options.kind, options.split, k, folder / f"clip-{k:05d}.npz") for k in numbers]
+    large = options.large or options.split != "train"
+    jobs = [(options.kind, options.split, k, folder / f"clip-{k:05d}.npz", large) for k in numbers]
     missing = [job for job in jobs if not job[3].exists()]
     seconds, lost = 0.0, 0
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="clip") as bar:

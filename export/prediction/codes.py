@@ -5,8 +5,7 @@
 Writes codes-train.npz and codes-val.npz to --out: `codes` int16 [N, T, slices, 16, 16]; `motion` int16 [N, T,
 horizons, slices, 16, 16], of the pictures that motion alone predicts (`motion_pictures.HORIZONS` frames after frame t),
 -1 where there is none; `fps` [N], `names` [N]. Clips to train on are there mirrored as well. Needs the SDK's library,
-for motion. With --keep-pictures those pictures are written as well, motion-train.npy and motion-val.npy: uint8 [N, T,
-horizons, 64, 64, 3], not mirrored (1.8 MB a clip).
+for motion.
 """
 
 from __future__ import annotations
@@ -57,11 +56,8 @@ def encoded(net: Autoencoder, frames: Tensor) -> Tensor:
     return torch.cat([net.encode(part).short() for part in frames.split(_AT_ONCE)])
 
 
-def coded_clips(
-    net: Autoencoder, clips: Clips, mirrored: bool, workers: Workers, keep: np.ndarray | None = None
-) -> CodedClips:
-    """On the CPU. mirrored: each clip mirrored as well, right behind it. keep: gets the pictures that motion predicts,
-    uint8 [N, T, horizons, 64, 64, 3]."""
+def coded_clips(net: Autoencoder, clips: Clips, mirrored: bool, workers: Workers) -> CodedClips:
+    """On the CPU. mirrored: each clip mirrored as well, right behind it."""
     device = next(net.parameters()).device
     count, frames = clips.frames.shape[:2]
     ways = 2 if mirrored else 1
@@ -71,8 +67,6 @@ def coded_clips(
     jobs = [MotionJob(k, clips.frames[k].numpy(), float(clips.fps[k])) for k in range(count)]
     with tqdm(total=count, unit="clip", desc="motion and codes", leave=False) as bar:
         for job, moved in results(workers.run(motion_pictures, jobs)):
-            if keep is not None:
-                keep[job.number] = moved
             pictures = torch.from_numpy(np.concatenate([job.frames[:, None], moved], 1)).to(device)
             both = torch.stack([pictures, pictures.flip(-2)][:ways])
             found[job.number] = encoded(net, both.flatten(0, 2)).view(found.shape[1:]).cpu()
@@ -81,12 +75,6 @@ def coded_clips(
     codes, motion = found[:, :, :, 0].flatten(0, 1), found[:, :, :, 1:].flatten(0, 1)
     motion[:, ~torch.tensor([[is_known(t, h, frames) for h in HORIZONS] for t in range(frames)])] = UNSEEN
     return CodedClips(codes, clips.fps.repeat_interleave(ways), names, motion)
-
-
-def motion_file(folder: Path, split: str, clips: Clips) -> np.ndarray:
-    """A new file for the pictures that motion predicts, as an array."""
-    size = (*clips.frames.shape[:2], len(HORIZONS), *clips.frames.shape[2:])
-    return np.lib.format.open_memmap(folder / f"motion-{split}.npy", "w+", np.uint8, size)
 
 
 def write_codes(clips: CodedClips, path: Path) -> None:
@@ -117,7 +105,6 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(".data/prediction"))
     parser.add_argument("--threads", type=int, help="default: one a core")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu", help="default %(default)s")
-    parser.add_argument("--keep-pictures", action="store_true", help="for train_convolutional --motion")
     Workers.add_arguments(parser, os.cpu_count())
     options = parser.parse_args()
     if options.threads:
@@ -127,8 +114,7 @@ def main() -> None:
     entries = net.shape.entries
     for split in ("train", "val"):
         read = read_clips(options.data, options.sets, split)
-        keep = motion_file(options.out, split, read) if options.keep_pictures else None
-        clips = coded_clips(net, read, split == "train", Workers.of(options), keep)
+        clips = coded_clips(net, read, split == "train", Workers.of(options))
         write_codes(clips, options.out / f"codes-{split}.npz")
         equal = float((clips.codes[:, 1:] == clips.codes[:, :-1]).float().mean())
         used = used_fraction(clips.codes.flatten(0, 1), entries)

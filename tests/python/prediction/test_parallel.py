@@ -1,4 +1,4 @@
-"""The parallel transformer and the convolutional network see what they may, and learn and resume."""
+"""The parallel transformer sees what it may, and learns and resumes."""
 
 import pytest
 
@@ -11,10 +11,7 @@ from export.prediction import train_parallel
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.codes import CodedClips, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
-from export.prediction.data import Clips
 from export.prediction.parallel import ParallelTransformer, times_ahead
-from export.prediction.pictures import train_convolutional
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.training import seed_step
 
 SMALL = TransformerShape(width=32, layers=1, heads=2, head_width=16, hidden=64, embedding=32, slices=2, entries=8)
@@ -100,44 +97,3 @@ def test_a_parallel_training_is_a_command(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", words)
     train_parallel.main()
     assert train_parallel.load_parallel(tmp_path / "out/weights.pt").shape == SMALL
-
-
-def moving_square(count=2, frames=16):
-    film = torch.full((count, frames, 64, 64, 3), 60, dtype=torch.uint8)
-    for t in range(frames):
-        film[:, t, 16:32, 2 * t : 2 * t + 16] = 220
-    return Clips(film, torch.full((count,), 10.0), [f"moving/{k}" for k in range(count)])
-
-
-def test_a_new_convolutional_network_repeats_the_last_frame_and_then_learns():
-    clips = moving_square()
-    torch.manual_seed(0)
-    shape = ConvolutionalShape(widths=(8, 16, 32), blocks=2)
-    training = train_convolutional.Training(shape)
-    before = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
-    assert before["network 4"] == pytest.approx(before["last 4"], abs=1e-3)
-    training.net.train()
-    for step in range(60):
-        seed_step(0, step)
-        training.advance(clips, None, 4, 3e-3)
-    after = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
-    assert after["network 8"] > after["last 8"] + 1
-    assert ConvolutionalNet(shape).predicted(clips.frames[:1, :3], torch.zeros(1, 2)).shape == (1, 64, 64, 3)
-
-
-def test_a_mender_begins_with_motion_and_learns_where_it_is_wrong():
-    clips = moving_square()
-    motion = torch.full((2, 16, len(train_convolutional.HORIZONS), 64, 64, 3), 140, dtype=torch.uint8)
-    torch.manual_seed(0)
-    training = train_convolutional.Training(ConvolutionalShape(widths=(8, 16, 32), blocks=2, motion=True))
-    with torch.no_grad():
-        shown = torch.cat([clips.frames[:1, :3], motion[:1, 5, :1]], 1)
-        first = training.net.predicted(shown, torch.zeros(1, 2))
-    assert (first - 140).abs().max() < 0.1 * 80, "motion's picture, with a twentieth of the last frame"
-    before = train_convolutional.figures_of(training.net.eval(), clips, motion, 8)
-    training.net.train()
-    for step in range(60):
-        seed_step(0, step)
-        training.advance(clips, motion, 4, 3e-3)
-    after = train_convolutional.figures_of(training.net.eval(), clips, motion, 8)
-    assert after["network 1"] > before["network 1"] + 5

@@ -22,7 +22,7 @@ def mended_samples(
 ) -> tuple[list[Sample], np.ndarray]:
     """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. data: what
     `export.prediction.pictures.foreseen` wrote. Raises SystemExit where there is nothing."""
-    known = read_foreseen(data, list(sets), split)
+    known = read_foreseen([data], list(sets), split)
     clips = known.clips
     total = clips.frames.shape[1]
     samples: list[Sample] = []

@@ -72,13 +72,14 @@ def write_foreseen(job: tuple[Path, Path]) -> None:
     partial.rename(path)
 
 
-def read_foreseen(folder: Path, kinds: list[str], split: str) -> ForeseenClips:
-    """All files of these sets. Raises SystemExit where there are none."""
-    paths = [(kind, path) for kind in kinds for path in clip_paths(folder, kind, split)]
+def read_foreseen(folders: list[Path], kinds: list[str], split: str) -> ForeseenClips:
+    """All files of these sets in all these folders. Raises SystemExit where there are none."""
+    paths = [(kind, path) for folder in folders for kind in kinds for path in clip_paths(folder, kind, split)]
     if not paths:
+        names, places = " ".join(kinds), " or ".join(map(str, folders))
         raise SystemExit(
-            f"Nothing is foreseen of {', '.join(kinds)} in {folder} ({split}). Write it: python -m "
-            f"export.prediction.pictures.foreseen --split {split} --sets {' '.join(kinds)} --out {folder}"
+            f"Nothing is foreseen of {names} in {places} ({split}). Write it: python -m "
+            f"export.prediction.pictures.foreseen --split {split} --sets {names} --out {folders[0]}"
         )
     frames, pictures, fps = [], [], []
     for _, path in paths:
@@ -95,6 +96,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"), help="clips (default %(default)s)")
     parser.add_argument("--sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
     parser.add_argument("--split", choices=SPLITS, default="train")
+    parser.add_argument("--clips", type=int, help="of each set, at most (default: all)")
     parser.add_argument("--out", type=Path, default=Path(".data/prediction/foreseen"))
     Workers.add_arguments(parser)
     options = parser.parse_args()
@@ -102,7 +104,7 @@ def main() -> None:
     for kind in options.sets:
         folder = options.out / kind / options.split
         folder.mkdir(parents=True, exist_ok=True)
-        jobs += [(path, folder / path.name) for path in clip_paths(options.data, kind, options.split)]
+        jobs += [(path, folder / path.name) for path in clip_paths(options.data, kind, options.split)[: options.clips]]
     if not jobs:
         raise SystemExit(f"No clips of {', '.join(options.sets)} in {options.data} ({options.split}).")
     missing = [job for job in jobs if not job[1].exists()]

@@ -103,7 +103,9 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/prediction-convolutional"))
-    parser.add_argument("--foreseen", type=Path, help="what pictures.foreseen wrote, instead of --data: mends that")
+    parser.add_argument(
+        "--foreseen", type=Path, nargs="+", help="what pictures.foreseen wrote, instead of --data: mends that"
+    )
     parser.add_argument("--validate-sets", nargs="+", help="default: as --sets")
     parser.add_argument("--init", type=Path, help="weights to begin from")
     parser.add_argument("--validate-frames", type=int, default=256, help="a time ahead (default %(default)s)")

@@ -71,7 +71,7 @@ def test_what_is_foreseen_of_a_clip_is_of_its_large_frames_if_it_has_some(tmp_pa
         folder.mkdir(parents=True)
     write_clip(clip, source)
     foreseen.write_foreseen((source, path))
-    known = foreseen.read_foreseen(tmp_path / "out", ["shapes"], "train")
+    known = foreseen.read_foreseen([tmp_path / "out"], ["shapes"], "train")
     frames, pictures = known.clips.frames[0].numpy(), known.pictures[0].numpy()
     assert known.clips.names == ["shapes/clip-00000"]
     assert known.clips.fps.tolist() == [clip.fps]
@@ -111,4 +111,4 @@ def test_a_training_of_what_is_foreseen_is_a_command_that_goes_on_from_weights(t
 
 def test_nothing_foreseen_is_said(tmp_path):
     with pytest.raises(SystemExit, match=r"pictures.foreseen --split val --sets shapes"):
-        foreseen.read_foreseen(tmp_path, ["shapes"], "val")
+        foreseen.read_foreseen([tmp_path], ["shapes"], "val")

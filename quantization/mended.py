@@ -1,28 +1,43 @@
-"""What the network that mends what is foreseen is given of clips, to calibrate its int8 graph and to measure it."""
+"""Puts the network that mends what is foreseen, as int8, into an int8 bundle of prediction, in place of the one there.
+
+    python -m export.prediction.pictures.foreseen --split train      # and --split val, first
+    python -m quantization.mended --weights .data/runs/prediction-mender/weights.pt --bundle sdk/models/prediction-int8
+
+Calibrated and measured on what is foreseen of clips. Prints sizes, signal to noise, and the PSNR of its pictures in
+float and int8 beside that of what is foreseen. All else in the bundle stays as it is.
+"""
 
 from __future__ import annotations
 
+import argparse
+import shutil
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from export.bundle import BundleInfo, bytes_of, read_manifest
 from export.densepose.graphs import session
+from export.prediction.bundle import write_manifest
 from export.prediction.motion_pictures import HORIZONS
 from export.prediction.parallel import times_ahead
 from export.prediction.pictures.foreseen import read_foreseen
-from export.prediction.pictures.mended_graph import MENDED
+from export.prediction.pictures.mended_graph import MENDED, export_mended
 from export.prediction.pictures.picture_error import psnr_db
+from export.prediction.pictures.train_convolutional import load_convolutional
+from quantization.quantize import as_measured, quantize_graphs
 from quantization.samples import Sample
+from quantization.settings import PREDICTION, PredictionSettings, read_settings
 
 
 def mended_samples(
-    data: Path, sets: Sequence[str], split: str, count: int, before: int
+    folder: Path, sets: Sequence[str], split: str, count: int, before: int
 ) -> tuple[list[Sample], np.ndarray]:
-    """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. data: what
-    `export.prediction.pictures.foreseen` wrote. Raises SystemExit where there is nothing."""
-    known = read_foreseen([data], list(sets), split)
+    """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. folder:
+    what `export.prediction.pictures.foreseen` wrote. Raises SystemExit where there is nothing."""
+    known = read_foreseen([folder], list(sets), split)
     clips = known.clips
     total = clips.frames.shape[1]
     samples: list[Sample] = []
@@ -32,18 +47,60 @@ def mended_samples(
         frames, fps = clips.frames[clip], clips.fps[clip]
         now = before - 1 + (7 * k) % (total - before - HORIZONS[h])
         shown = torch.cat([*frames[now + 1 - before : now + 1], known.pictures[clip, now, h]], -1)[None].float()
-        samples.append(
-            {"pictures": shown.numpy(), "times": times_ahead(fps[None], torch.tensor([HORIZONS[h]])).numpy()}
-        )
+        times = times_ahead(fps[None], torch.tensor([HORIZONS[h]]))
+        samples.append({"pictures": shown.numpy(), "times": times.numpy()})
         truth.append(frames[now + HORIZONS[h]].numpy())
     return samples, np.stack(truth)
 
 
-def mended_cost(fp32: Path, int8: Path, samples: Sequence[Sample], truth: np.ndarray) -> dict[str, float]:
-    """mended_db_fp32, mended_db_int8: PSNR of what it makes."""
-    found = {}
-    for name, folder in (("fp32", fp32), ("int8", int8)):
-        graph = session(folder / f"{MENDED}.onnx")
+def mended_cost(graphs: dict[str, Path], samples: Sequence[Sample], truth: np.ndarray) -> dict[str, float]:
+    """PSNR of what each graph makes, as mended_db_NAME, and of what it mends, foreseen_db."""
+    wanted = torch.from_numpy(truth)
+    foreseen = torch.from_numpy(np.concatenate([sample["pictures"][..., -3:] for sample in samples]))
+    found = {"foreseen_db": round(float(psnr_db(foreseen, wanted).mean()), 2)}
+    for name, path in graphs.items():
+        graph = session(path)
         made = torch.from_numpy(np.concatenate([graph.run(None, sample)[0] for sample in samples]))
-        found[f"mended_db_{name}"] = round(float(psnr_db(made, torch.from_numpy(truth)).mean()), 2)
+        found[f"mended_db_{name}"] = round(float(psnr_db(made, wanted).mean()), 2)
     return found
+
+
+def put_mended(weights: Path, bundle: Path, foreseen: Path, sets: Sequence[str], settings: PredictionSettings) -> dict:
+    """Returns the new manifest. Raises ValueError for weights of a network that is not shown what is foreseen."""
+    net = load_convolutional(weights)
+    counts = {"train": settings.frames, "val": settings.held_out_frames}
+    given = {split: mended_samples(foreseen, sets, split, n, net.shape.frames) for split, n in counts.items()}
+    graph = f"{MENDED}.onnx"
+    with tempfile.TemporaryDirectory() as folder:
+        fp32, int8 = Path(folder) / "fp32", Path(folder) / "int8"
+        fp32.mkdir()
+        int8.mkdir()
+        export_mended(net, fp32)
+        calibrating, held_out = ({MENDED: samples} for samples, _ in given.values())
+        quality = quantize_graphs(fp32, int8, {MENDED: settings.graphs[MENDED]}, calibrating, held_out)
+        cost = mended_cost({"fp32": fp32 / graph, "int8": int8 / graph}, *given["val"])
+        shutil.copyfile(int8 / graph, bundle / graph)
+    print(", ".join(f"{name} {value}" for name, value in cost.items()))
+    known = read_manifest(bundle)
+    measured = {part: dict(values) for part, values in known["measured"].items()}
+    measured.setdefault("sqnr_db", {}).update(as_measured(quality))
+    measured.setdefault("int8_cost", {}).update(cost)
+    about = {key: known[key] for key in ("name", "precision", "version", "training_data")}
+    return write_manifest(bundle, BundleInfo(**about, measured=measured))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--weights", type=Path, default=Path(".data/runs/prediction-mender/weights.pt"))
+    parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/prediction-int8"))
+    parser.add_argument("--foreseen", type=Path, default=Path(".data/prediction/foreseen"))
+    parser.add_argument("--sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
+    parser.add_argument("--settings", type=Path, default=PREDICTION)
+    options = parser.parse_args()
+    settings = read_settings(options.settings, PredictionSettings)
+    put_mended(options.weights, options.bundle, options.foreseen, options.sets, settings)
+    print(f"{options.bundle}: {bytes_of(options.bundle) / 1e6:.2f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -3,8 +3,9 @@
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
 What stays float is in `quantization/prediction.toml`; a transformer is made int8 as `quantization/transformer.py` says.
-Prints sizes, each output's signal to noise ratio, and what int8 costs on frames of validation clips: codes that stay
-the same, PSNR of frames that were made codes and frames again, and bits a code by the transformer.
+`python -m quantization.mended` adds the network that mends what is foreseen, afterwards. Prints sizes, each output's
+signal to noise ratio, and what int8 costs on frames of validation clips: codes that stay the same, PSNR of frames that
+were made codes and frames again, and bits a code by the transformer.
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ from export.prediction.data import read_clips
 from export.prediction.graphs.expected_graph import EXPECTED
 from export.prediction.pictures.mended_graph import MENDED
 from export.prediction.pictures.picture_error import psnr_db
-from quantization.mended import mended_cost, mended_samples
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
@@ -87,30 +87,19 @@ def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings
     calibrating = frames_of(options.data, options.sets, "train", settings.frames)
     held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)
     given = samples(options.fp32, calibrating, codes), samples(options.fp32, held_out, codes)
-    truth = None
-    if (options.fp32 / f"{MENDED}.onnx").exists():
-        before = read_manifest(options.fp32)[MENDED]["before"]
-        for own, split, count in zip(given, ("train", "val"), (settings.frames, settings.held_out_frames), strict=True):
-            own[MENDED], truth = mended_samples(options.foreseen, options.foreseen_sets, split, count, before)
-    graphs = {name: own for name, own in settings.graphs.items() if name in given[0]}
+    graphs = {name: settings.graphs[name] for name in GRAPHS}
     quality = quantize_graphs(options.fp32, options.out, graphs, *given)
-    measured = cost(options.fp32, options.out, held_out, codes)
-    if truth is not None:
-        measured |= mended_cost(options.fp32, options.out, given[1][MENDED], truth)
-    return quality, measured
+    return quality, cost(options.fp32, options.out, held_out, codes)
 
 
 def kept_pictures(options: argparse.Namespace) -> tuple[Quality, dict[str, float]]:
-    """The same from the bundle to be kept. Raises SystemExit where that has other codes, or where the one to be
-    quantized has a network that it lacks."""
+    """The same from the bundle to be kept. Raises SystemExit where that has other codes."""
     if (options.keep / CODES).read_bytes() != (options.fp32 / CODES).read_bytes():
         raise SystemExit(f"{options.keep} has other codes than {options.fp32}: leave --keep out.")
-    if (options.fp32 / f"{MENDED}.onnx").exists():
-        raise SystemExit(f"{options.fp32} has the network that mends motion, too: leave --keep out.")
     for name in GRAPHS if options.keep.resolve() != options.out.resolve() else ():
         shutil.copyfile(options.keep / f"{name}.onnx", options.out / f"{name}.onnx")
     measured = read_manifest(options.keep)["measured"]
-    of_pictures = {name: value for name, value in measured["int8_cost"].items() if not name.startswith("bits")}
+    of_pictures = {name: own for name, own in measured["int8_cost"].items() if name.startswith(("equal", "psnr"))}
     return {name: own for name, own in measured["sqnr_db"].items() if name in GRAPHS}, of_pictures
 
 
@@ -122,13 +111,6 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(".data/clips"))
     parser.add_argument("--codes", type=Path, default=Path(".data/prediction"), help="of clips, for the transformer")
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
-    parser.add_argument(
-        "--foreseen",
-        type=Path,
-        default=Path(".data/prediction/foreseen"),
-        help="of clips (pictures.foreseen)",
-    )
-    parser.add_argument("--foreseen-sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
     parser.add_argument("--settings", type=Path, default=PREDICTION)
     parser.add_argument(
         "--keep", type=Path, metavar="DIR", help="int8 bundle of the same codes: its autoencoder is taken as it is"
@@ -136,11 +118,10 @@ def main() -> None:
     options = parser.parse_args()
     settings = read_settings(options.settings, PredictionSettings)
     options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / f"{MENDED}.onnx").unlink(missing_ok=True)  # of an earlier bundle
     quality, measured = kept_pictures(options) if options.keep else quantized_pictures(options, settings)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    for name in (TRANSFORMER, f"{EXPECTED}.onnx"):  # of an earlier bundle
+    for name in (TRANSFORMER, f"{EXPECTED}.onnx", f"{MENDED}.onnx"):  # of an earlier bundle
         (options.out / name).unlink(missing_ok=True)
     if (options.fp32 / f"{EXPECTED}.onnx").exists():
         quantize_expected(options.fp32, options.out)

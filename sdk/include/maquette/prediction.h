@@ -27,7 +27,7 @@ typedef enum maq_prediction_method {
 /* Values never change meaning; new ones are added at the end. */
 typedef enum maq_network_mode {
   MAQ_NETWORK_AUTO = 0,     /* the first of these that the bundle has */
-  MAQ_NETWORK_MENDED = 1,   /* what motion foresees, mended by a network that sees the frames before as well */
+  MAQ_NETWORK_MENDED = 1,   /* what AUTO has, mended by a network that sees the frames before as well; one pass */
   MAQ_NETWORK_EXPECTED = 2, /* the mean of the codes that may come, in one pass; it blurs what is uncertain */
   MAQ_NETWORK_DRAWN = 3     /* one of what may come, drawn code after code, in steps of at most 0.1 s; takes long */
 } maq_network_mode;

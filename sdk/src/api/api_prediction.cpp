@@ -77,7 +77,9 @@ NetworksOfMode open_networks_of_mode(ContextState& state, const maq_predictor_co
   NetworksOfMode opened;
   opened.networks.workspaces = state.predictor_workspaces();
   opened.networks.encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, session);
-  opened.networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
+  if (mode != MAQ_NETWORK_MENDED) {
+    opened.networks.decoder = std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, session);
+  }
   switch (mode) {
     case MAQ_NETWORK_DRAWN:
       opened.mode = NetworkMode::kDrawn;

@@ -125,10 +125,10 @@ TEST(NetworkPredictor, ItsPictureIsTheBaseAndWhatTheNetworksPictureDiffersFromTh
       std::vector<uint8_t> squeezed(made.size());
       own.encoder->squeeze(of_base.image, squeezed.data());
       own.mended->run(shown, squeezed.data(), 0.1f, 0.1f, made.data());
-      // Half of what it changes, less half a level.
+      // What it changes, less half a level.
       for (size_t i = 0; i < made.size(); ++i) {
-        const float half = (made[i] - float(squeezed[i])) / 2;
-        made[i] = half > 0.5f ? half - 0.5f : half < -0.5f ? half + 0.5f : 0.0f;
+        const float change = made[i] - float(squeezed[i]);
+        made[i] = change > 0.5f ? change - 0.5f : change < -0.5f ? change + 0.5f : 0.0f;
       }
     } else if (mode == maq::NetworkMode::kDrawn) {
       before.frames[3] = motion.at(4 * tiny_prediction::kFrame_ns, codes[3].data());

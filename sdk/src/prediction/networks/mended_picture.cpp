@@ -29,13 +29,13 @@ MendedPicture::MendedPicture(std::shared_ptr<const OnnxRuntimeLibrary> runtime, 
   outputs_ = {bundle.frame_shape()};
 }
 
-void MendedPicture::run(const uint8_t* const* frames, const uint8_t* moved, float step_s, float ahead_s,
+void MendedPicture::run(const uint8_t* const* frames, const uint8_t* foreseen, float step_s, float ahead_s,
                         float* picture) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const uint8_t* const oldest =
       *std::find_if(frames, frames + before_ - 1, [](auto frame) { return frame != nullptr; });
   for (size_t i = 0; i <= before_; ++i) {
-    const uint8_t* const from = i == before_ ? moved : frames[i] != nullptr ? frames[i] : oldest;
+    const uint8_t* const from = i == before_ ? foreseen : frames[i] != nullptr ? frames[i] : oldest;
     for (size_t pixel = 0; pixel < values_ / 3; ++pixel) {
       std::copy_n(from + 3 * pixel, 3, given_.data() + (pixel * (before_ + 1) + i) * 3);
     }

@@ -1,4 +1,4 @@
-// What motion foresees, mended by a network that sees the frames before as well: small pictures, without codes.
+// What is foreseen without networks, mended by one that sees the frames before as well: small pictures, without codes.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +26,10 @@ class MendedPicture {
   size_t before() const { return before_; }  // frames of the stream that are seen
 
   // `frames`: those before, the oldest first, each R, G, B of [frame_px][frame_px], `step_s` apart; null, the oldest of
-  // them, where there are none, but the last is not. `moved`: what motion foresees for the time `ahead_s` after the
+  // them, where there are none, but the last is not. `foreseen`: the picture to mend, of the time `ahead_s` after the
   // newest. `picture`: [frame_px][frame_px][3], not limited to 0..255. Throws MAQ_ERROR_INFERENCE, also where the
   // network gives numbers that are not finite; `picture` is then as before.
-  void run(const uint8_t* const* frames, const uint8_t* moved, float step_s, float ahead_s, float* picture);
+  void run(const uint8_t* const* frames, const uint8_t* foreseen, float step_s, float ahead_s, float* picture);
 
  private:
   size_t before_ = 0, values_ = 0;  // of a picture

@@ -10,10 +10,8 @@
 namespace maq {
 namespace {
 
-// How much of what the mended picture changes is taken, and how many grey levels less: the mean of two predictions is
-// better than either, and at full size motion is more exact than the network has learnt; the rest is noise of int8.
-// Chosen on validation clips of `pushing` and five real ones (docs/prediction.md).
-constexpr float kTrust = 0.5f, kNoise = 0.5f;
+// Grey levels that the mended picture is taken to differ by int8 alone.
+constexpr float kNoise = 0.5f;
 
 }  // namespace
 
@@ -183,7 +181,7 @@ void NetworkPredictor::predict(int64_t ahead_ns, Frame& frame) {
       mend(ahead_ns);
       counts_.passes = 1;
       for (size_t i = 0; i < made_.size(); ++i) {
-        const float difference = (made_[i] - float(squeezed_[i])) * kTrust;
+        const float difference = made_[i] - float(squeezed_[i]);
         made_[i] = difference - std::clamp(difference, -kNoise, kNoise);
       }
       difference_.add(made_.data(), networks_.encoder->frame_px(), frame.image, threads_, frame.storage.data());

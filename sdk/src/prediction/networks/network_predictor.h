@@ -19,7 +19,7 @@
 
 namespace maq {
 
-// Shared by streams. Networks of modes that no predictor has may be null.
+// Shared by streams. Those that no predictor's mode needs may be null: only modes with codes need the decoder.
 struct PredictionNetworks {
   std::shared_ptr<FrameEncoder> encoder;
   std::shared_ptr<FrameDecoder> decoder;
@@ -30,7 +30,7 @@ struct PredictionNetworks {
 };
 
 enum class NetworkMode {
-  kMended,    // what motion foresees, mended
+  kMended,    // what the last frame and motion foresee, mended
   kExpected,  // the mean of the codes that may come
   kDrawn      // codes of one of what may come, frame after frame
 };
@@ -51,8 +51,9 @@ class NetworkPredictor {
   void push(const Frame& frame);
   // As Predictor::predict(). The picture that the last frame and motion foresee is changed by what the networks'
   // picture differs from what they make of that one: their own error then mostly cancels, and what they cannot see
-  // stays; of what the mended picture differs from it only half is taken. Nothing is changed while nothing moves, and
-  // before the second frame. Throws what that and the networks throw.
+  // stays. The mended picture is made from that one, squeezed, so that its difference is taken as it is, less half a
+  // grey level. Nothing is changed while nothing moves, and before the second frame. Throws what that and the networks
+  // throw.
   void predict(int64_t ahead_ns, Frame& frame);
   void reset();
 

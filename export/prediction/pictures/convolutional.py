@@ -1,11 +1,13 @@
 """A convolutional network that predicts a frame from the three before, in the manner of SimVP (arXiv 2206.05099): an
 encoder, blocks of wide convolutions at a quarter of the size, a decoder. It has no codes and no probabilities: what the
-transformer is compared with. Given the picture that motion predicts as well, it mends that."""
+transformer is compared with. Given a picture that is foreseen as well, it mends that: it mixes it, place by place, with
+its own."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -15,7 +17,7 @@ from export.prediction.autoencoder import scaled
 @dataclass(frozen=True)
 class ConvolutionalShape:
     """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks;
-    motion: whether the picture that motion predicts is seen as well."""
+    motion: whether a picture that is foreseen from motion is seen as well, and mended."""
 
     widths: tuple[int, int, int] = (32, 96, 192)
     blocks: int = 6
@@ -25,7 +27,7 @@ class ConvolutionalShape:
 
     @property
     def seen(self) -> int:
-        """Pictures that the network is given: frames before, oldest first, and last the one by motion."""
+        """Pictures that the network is given: frames before, oldest first, and last the one that is foreseen."""
         return self.frames + self.motion
 
 
@@ -65,14 +67,13 @@ class ConvolutionalNet(nn.Module):
             nn.ReLU(),
             nn.Conv2d(first, 3 + shape.motion, 3, padding=1),
         )
-        nn.init.zeros_(self.out[-1].weight)  # a new network repeats its last picture
+        nn.init.zeros_(self.out[-1].weight)  # a new one repeats the last frame, or half of that and what is foreseen
         nn.init.zeros_(self.out[-1].bias)
 
     def forward(self, before: Tensor, times: Tensor) -> Tensor:
         """before [B, seen, 3, 64, 64] in -1..1, oldest first; times [B, 2] of `times_ahead` -> [B, 3, 64, 64].
 
-        What the last frame changes by is learnt; or with motion, where its picture gives way to the last frame, and
-        what changes besides.
+        What the last frame changes by is learnt; and how much of the picture is that, the rest being what is foreseen.
         """
         fine = self.fine(before.flatten(1, 2))
         half = self.middle(fine)
@@ -82,8 +83,18 @@ class ConvolutionalNet(nn.Module):
         found = self.out(fine + self.to_fine(half + self.to_half(x)))
         if not self.shape.motion:
             return before[:, -1] + found
-        still = (found[:, 3:] - 3).sigmoid()  # a twentieth at first
-        return before[:, -1] * (1 - still) + before[:, -2] * still + found[:, :3]
+        own, share = before[:, -2] + found[:, :3], found[:, 3:].sigmoid()
+        return before[:, -1] + share * (own - before[:, -1])
+
+    def begin_with(self, other: ConvolutionalNet) -> None:
+        """Takes over the weights of a network of the same widths and blocks; where that sees no picture that is
+        foreseen, and this one does, half of its picture and half of that."""
+        known = other.state_dict()
+        for name, own in self.state_dict().items():
+            grown = torch.zeros_like(own)
+            grown[tuple(slice(side) for side in known[name].shape)] = known[name]
+            known[name] = grown
+        self.load_state_dict(known)
 
     def predicted(self, frames: Tensor, times: Tensor) -> Tensor:
         """frames [B, seen, 64, 64, 3], 0..255 -> float32 [B, 64, 64, 3], 0..255."""

@@ -26,6 +26,7 @@ from export.prediction.pictures.foreseen import read_foreseen
 from export.prediction.pictures.picture_error import psnr_db
 
 _BATCH = 64  # held-out frames at once
+_GAIN, _OFFSET = 0.15, 8.0  # standard deviations: natural logarithm, and grey levels
 _NOISE = 4.0  # squared grey levels: errors below this count little
 
 
@@ -35,7 +36,7 @@ class Training(run.Training):
         super().__init__(net, torch.optim.AdamW(net.parameters(), betas=(0.9, 0.99), weight_decay=0.01), bf16)
 
     def advance(self, clips: Clips, foreseen: Tensor | None, count: int, rate: float) -> dict[str, Tensor]:
-        """One step on `count` frames at random, half of them mirrored, at that learning rate. foreseen uint8 [N, T,
+        """One step on `count` frames at random, at that learning rate. foreseen uint8 [N, T,
         horizons, 64, 64, 3]: what is changed, instead of the last frame, where the network sees it.
 
         The loss is the squared error by that of the picture that is changed: hard clips and far times would have nearly
@@ -51,15 +52,24 @@ class Training(run.Training):
         before, truth = frames_of(clips, clip, now, self.net.shape.frames), clips.frames[clip, now + ahead]
         if foreseen is not None:
             before = torch.cat([before, foreseen[clip, now, horizon][:, None]], 1)
-        mirrored = torch.rand(count, 1, 1, 1, device=device) < 0.5
-        before = torch.where(mirrored[:, None], before.flip(3), before)
-        truth = torch.where(mirrored, truth.flip(2), truth).float()
+        before, truth = as_elsewhere(before, truth)
         with self.autocast():
             made = self.net.predicted(before, times_ahead(clips.fps[clip], ahead.float()))
-        own, base = ((p - truth).square().mean((1, 2, 3)) for p in (made, before[:, -1].float()))
+        own, base = ((p - truth).square().mean((1, 2, 3)) for p in (made, before[:, -1]))
         loss = (own / (base + _NOISE)).mean()
         self.descend(loss, rate, largest_gradient=1.0)
         return {"picture": loss.detach()}
+
+
+def as_elsewhere(before: Tensor, truth: Tensor) -> tuple[Tensor, Tensor]:
+    """As another camera would show them: half of them mirrored, brighter or darker. uint8 [B, seen, 64, 64, 3] and
+    [B, 64, 64, 3] -> the same as float32, 0..255."""
+    pictures = torch.cat([before, truth[:, None]], 1).float()
+    mirrored = torch.rand(len(pictures), 1, 1, 1, 1, device=pictures.device) < 0.5
+    pictures = torch.where(mirrored, pictures.flip(3), pictures)
+    gain, offset = torch.randn(2, len(pictures), 1, 1, 1, 1, device=pictures.device)
+    pictures = (pictures * (_GAIN * gain).exp() + _OFFSET * offset).clamp(0, 255)
+    return pictures[:, :-1], pictures[:, -1]
 
 
 def frames_of(clips: Clips, clip: Tensor, now: Tensor, count: int) -> Tensor:
@@ -107,7 +117,7 @@ def parsed() -> argparse.Namespace:
         "--foreseen", type=Path, nargs="+", help="what pictures.foreseen wrote, instead of --data: mends that"
     )
     parser.add_argument("--validate-sets", nargs="+", help="default: as --sets")
-    parser.add_argument("--init", type=Path, help="weights to begin from")
+    parser.add_argument("--init", type=Path, help="weights to begin from, with or without what is foreseen")
     parser.add_argument("--validate-frames", type=int, default=256, help="a time ahead (default %(default)s)")
     run.add_arguments(parser, minutes=120, batch=16, rate=1e-3)
     return parser.parse_args()
@@ -130,7 +140,7 @@ def train(arguments: argparse.Namespace) -> None:
         held_out = read_clips(arguments.data, held_out_sets, "val").on(device)
     training = Training(ConvolutionalShape(motion=foreseen is not None), arguments.bf16, arguments.device)
     if arguments.init:
-        training.net.load_state_dict(load_convolutional(arguments.init).state_dict())
+        training.net.begin_with(load_convolutional(arguments.init))
     run.run(
         training, arguments, lambda rate: training.advance(clips, foreseen, arguments.batch, rate),
         lambda: figures_of(training.net, held_out, held_out_foreseen, arguments.validate_frames), "held out: PSNR, dB",

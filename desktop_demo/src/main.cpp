@@ -80,7 +80,9 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->needs(next)
       ->check(CLI::Range(kMinAheadMs, kMaxAheadMs));
-  cli.add_option("--method", method, "By which it is predicted; auto: whichever was right about the latest frames")
+  cli.add_option("--method", method,
+                 "By which it is predicted; auto: whichever was right about the latest frames; network: that, mended "
+                 "by a network")
       ->capture_default_str()
       ->needs(next)
       ->check(CLI::IsMember(kMethodNames));
@@ -96,7 +98,7 @@ int main(int argc, char** argv) try {
   cli.add_flag("--sample", options.prediction.draws_sample, "A picture that may come, drawn by networks, beside them")
       ->needs(next);
   cli.add_option("--prediction-bundle", options.prediction.bundle,
-                 "Folder of the networks for surprise, uncertainty and samples");
+                 "Folder of the networks for surprise, uncertainty, samples and --method network");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");

@@ -50,7 +50,7 @@ bool NextView::update() {
 }
 
 Action NextView::press(int key) {
-  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_3) choice_.method = maq_prediction_method(key - GLFW_KEY_1);
+  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_4) choice_.method = maq_prediction_method(key - GLFW_KEY_1);
   if (key == GLFW_KEY_B) choice_.bridges_gaps = !choice_.bridges_gaps;
   if (key == GLFW_KEY_S) choice_.finds_surprise = !choice_.finds_surprise;
   if (key == GLFW_KEY_U) choice_.finds_uncertainty = !choice_.finds_uncertainty;
@@ -161,9 +161,9 @@ Action NextView::draw_panel() {
     choice_.ahead_s = double(ahead_ms) / 1e3;
     changed = true;
   }
-  ImGui::TextUnformatted("Method (1 to 3)");
+  ImGui::TextUnformatted("Method (1 to 4)");
   for (size_t i = 0; i < kMethodNames.size(); ++i) {
-    if (i != 0) ImGui::SameLine(float(i) * 100 * window_.scale());
+    if (i != 0) ImGui::SameLine(float(i) * 75 * window_.scale());
     const auto method = maq_prediction_method(i);
     if (!ImGui::RadioButton(kMethodNames[i], choice_.method == method)) continue;
     choice_.method = method;

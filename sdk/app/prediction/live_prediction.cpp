@@ -27,7 +27,8 @@ std::string whole(double value) { return std::to_string(std::lround(value)); }
 std::string text_of_method(const maq_predictor_stats& stats) {
   if (stats.method == MAQ_PREDICTION_LAST) return "last";
   if (stats.method == MAQ_PREDICTION_MOTION) return "motion";
-  return whole(100 * double(stats.motion_fraction)) + " % motion";
+  const std::string mended = stats.networks_ms > 0 ? ", mended" : "";
+  return whole(100 * double(stats.motion_fraction)) + " % motion" + mended;
 }
 
 std::string text_of_next(const PredictionFrame& frame, bool has_uncertainty) {
@@ -204,17 +205,29 @@ void LivePrediction::apply(const Wanted& wanted) {
     });
   }
   const PredictionChoice& choice = wanted.choice;
-  if (!predictor_ || method_ != choice.method) {
-    maq_predictor_config config = default_predictor_config();
-    config.method = method_ = choice.method;
-    predictor_.emplace(context_, config);
-    has_pushed_ = false;
-  }
+  if (!predictor_ || method_ != choice.method) switch_method(choice);
   const bool bridges = choice.bridges_gaps && source_->info().is_live == 1;
   if (bridges && !concealer_) concealer_.emplace(context_, *source_);
   if (!bridges) concealer_.reset();
   if (is_surprise_switched_ != choice.finds_surprise) switch_surprise(choice);
   switch_draws(choice);
+}
+
+// Without its network the picture is that of MAQ_PREDICTION_AUTO.
+void LivePrediction::switch_method(const PredictionChoice& choice) {
+  maq_predictor_config config = default_predictor_config();
+  config.method = method_ = choice.method;
+  config.network_mode = MAQ_NETWORK_MENDED;
+  if (!choice.bundle.empty()) config.bundle_path = choice.bundle.c_str();
+  try {
+    predictor_.emplace(context_, config);
+  } catch (const Error& error) {
+    if (config.method != MAQ_PREDICTION_NETWORK) throw;
+    config.method = MAQ_PREDICTION_AUTO;
+    predictor_.emplace(context_, config);
+    enter(MAQ_PIPELINE_RUNNING, error.what());
+  }
+  has_pushed_ = false;
 }
 
 // They begin with the frames that come from then on.

@@ -26,11 +26,11 @@ namespace maquette {
 
 struct PredictionChoice {
   double ahead_s = 0.2;
-  maq_prediction_method method = MAQ_PREDICTION_AUTO;
-  bool bridges_gaps = false;  // of a source that plays in real time; others have none
+  maq_prediction_method method = MAQ_PREDICTION_AUTO;  // with MAQ_PREDICTION_NETWORK, mended
+  bool bridges_gaps = false;                           // of a source that plays in real time; others have none
   bool finds_surprise = false;
   bool finds_uncertainty = false, draws_sample = false;  // of next; the second: a picture that may come, drawn
-  std::string bundle;  // folder of the networks for these; "": the one installed with the library
+  std::string bundle;  // folder of the networks; "": the one installed with the library
 };
 
 struct SurpriseMoment {
@@ -93,6 +93,7 @@ class LivePrediction final : public LivePlayer {
   void close_source();
   void apply(const Wanted& wanted);
   void record(const std::function<void()>& step);
+  void switch_method(const PredictionChoice& choice);
   void switch_surprise(const PredictionChoice& choice);
   void find_surprise(const Frame& frame);
   void switch_draws(const PredictionChoice& choice);

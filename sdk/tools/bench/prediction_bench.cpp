@@ -74,8 +74,12 @@ class PredictionCase {
   const char* name() const { return name_; }
   const StageTimes& times() const { return times_; }
   virtual bool sees_small_frames() const { return false; }
-  virtual std::vector<std::string> warnings(const PredictionBenchOptions& options) const {
-    return times_.warnings(options.runs, options.seconds);
+  std::vector<std::string> warnings(const PredictionBenchOptions& options) const {
+    std::vector<std::string> reasons = times_.warnings(options.runs, options.seconds);
+    if (resting_ > 0) {
+      reasons.push_back("nothing moved in " + std::to_string(resting_) + " frames, so that no network ran");
+    }
+    return reasons;
   }
   virtual void add_settings(OrderedJson* json) const = 0;
 
@@ -95,6 +99,9 @@ class PredictionCase {
     }
   }
 
+ protected:
+  void count_resting() { ++resting_; }  // a frame of which a network ought to make something, and did not
+
  private:
   virtual void reset() = 0;
   virtual void show(const maquette::Frame& frame) = 0;
@@ -102,6 +109,7 @@ class PredictionCase {
 
   const char* name_;
   StageTimes times_;
+  int resting_ = 0;
 };
 
 class SurpriseCase final : public PredictionCase {
@@ -128,26 +136,37 @@ class SurpriseCase final : public PredictionCase {
   maquette::Surprise surprise_;
 };
 
-// A frame is pushed, and the next one made of it, without networks.
+// A frame is pushed, and the next one made of it, without drawing.
 class PictureCase final : public PredictionCase {
  public:
   PictureCase(const char* name, const maquette::Context& context, const maq_predictor_config& config)
-      : PredictionCase(name, {"brightness", "motion", "choice", "move_on", "pixels", "frame"}),
-        predictor_(context, config) {}
+      : PredictionCase(name, stages_of(config)),
+        predictor_(context, config),
+        has_network_(config.method == MAQ_PREDICTION_NETWORK) {}
 
   void add_settings(OrderedJson*) const override {}
 
  private:
+  static std::vector<const char*> stages_of(const maq_predictor_config& config) {
+    std::vector<const char*> stages{"brightness", "motion", "choice", "move_on", "pixels"};
+    if (config.method == MAQ_PREDICTION_NETWORK) stages.push_back("network");
+    stages.push_back("frame");
+    return stages;
+  }
   void reset() override { predictor_.reset(); }
   void show(const maquette::Frame& frame) override { predictor_.push(frame); }
   std::vector<double> run(const maquette::Frame& frame, double step_s) override {
     predictor_.push(frame);
     predictor_.predict(step_s);
     const maq_predictor_stats stats = predictor_.stats();
-    return {stats.grey_ms, stats.flow_ms, stats.choice_ms, stats.project_ms, stats.fetch_ms};
+    std::vector<double> ms{stats.grey_ms, stats.flow_ms, stats.choice_ms, stats.project_ms, stats.fetch_ms};
+    if (has_network_) ms.push_back(stats.networks_ms);
+    if (has_network_ && stats.networks_ms == 0) count_resting();
+    return ms;
   }
 
   maquette::Predictor predictor_;
+  const bool has_network_;
 };
 
 // A frame is pushed, samples of what comes are drawn by networks, and the last picture of one is made.
@@ -162,13 +181,6 @@ class DrawnCase final : public PredictionCase {
         frames_(frames) {}
 
   bool sees_small_frames() const override { return true; }
-  std::vector<std::string> warnings(const PredictionBenchOptions& options) const override {
-    std::vector<std::string> reasons = PredictionCase::warnings(options);
-    if (resting_ > 0) {
-      reasons.push_back("nothing moved in " + std::to_string(resting_) + " frames, so that no network ran");
-    }
-    return reasons;
-  }
   void add_settings(OrderedJson* json) const override {
     (*json)["samples"] = samples_;
     (*json)["frames_drawn"] = frames_;
@@ -185,14 +197,13 @@ class DrawnCase final : public PredictionCase {
     const auto pushed = Clock::now();
     predictor_.draw(samples_, frames_, step_s);
     const auto drawn = Clock::now();
-    if (predictor_.stats().drawn_count == 0) ++resting_;
+    if (predictor_.stats().drawn_count == 0) count_resting();
     predictor_.drawn(samples_ - 1, frames_);
     return {ms_between(begin, pushed), ms_between(pushed, drawn), ms_between(drawn, Clock::now())};
   }
 
   maquette::Predictor predictor_;
   const uint32_t passes_, samples_, frames_;
-  int resting_ = 0;
 };
 
 using Cases = std::vector<std::unique_ptr<PredictionCase>>;
@@ -221,6 +232,13 @@ Cases make_cases(const maquette::Context& context, const PredictionBenchOptions&
 
   if (!bundle.empty()) predictor.bundle_path = bundle.c_str();
   predictor.method = MAQ_PREDICTION_NETWORK;
+  predictor.network_mode = MAQ_NETWORK_MENDED;
+  try {
+    cases.push_back(std::make_unique<PictureCase>("next by auto, mended", context, predictor));
+  } catch (const maquette::Error& error) {
+    if (error.status() != MAQ_ERROR_UNSUPPORTED) throw;
+    left_out->push_back(std::string("Nothing is mended: ") + error.what());
+  }
   predictor.network_mode = MAQ_NETWORK_DRAWN;
   predictor.temperature = 1;
   struct Drawing {

@@ -48,8 +48,14 @@ const char* name_of(maq_prediction_method method) {
   switch (method) {
     case MAQ_PREDICTION_LAST: return "last";
     case MAQ_PREDICTION_MOTION: return "motion";
+    case MAQ_PREDICTION_NETWORK: return "network";
     default: return "auto";
   }
+}
+
+// Beside last and motion.
+bool has_own_column(maq_prediction_method method) {
+  return method == MAQ_PREDICTION_AUTO || method == MAQ_PREDICTION_NETWORK;
 }
 
 // Peak signal-to-noise ratio of pictures of 8 bits; 99 dB where they are the same.
@@ -73,6 +79,8 @@ maquette::Predictor make_predictor(const maquette::Context& context, const Predi
   maq_predictor_config config = maquette::default_predictor_config();
   config.threads = options.threads;
   config.method = method;
+  config.network_mode = MAQ_NETWORK_MENDED;
+  if (!options.drawn.bundle.empty()) config.bundle_path = options.drawn.bundle.c_str();
   return maquette::Predictor(context, config);
 }
 
@@ -203,7 +211,7 @@ int predict(const PredictOptions& options) {
   if (samples) samples->draw(options.frames, step_s);
   const bool is_row = options.compare || samples.has_value();
   if (pictures.is_clip()) {
-    const size_t compared = !options.compare ? 0 : options.method == MAQ_PREDICTION_AUTO ? 4 : 3;
+    const size_t compared = !options.compare ? 0 : has_own_column(options.method) ? 4 : 3;
     const size_t columns = compared + (samples ? size_t(samples->count()) + 1 : 0);
     for (const cv::Mat& picture : before) {
       const std::vector<std::pair<std::string, cv::Mat>> row(columns, {"seen", picture});
@@ -238,8 +246,8 @@ int predict(const PredictOptions& options) {
       columns = {{has_truth ? "truth" : "no truth", seen_then},
                  {caption("last", ahead.ahead_s, ahead.last_db), before.back()},
                  {caption("motion", ahead.ahead_s, ahead.motion_db), moved}};
-      if (options.method == MAQ_PREDICTION_AUTO) {
-        columns.emplace_back(caption("auto", ahead.ahead_s, ahead.chosen_db), picture);
+      if (has_own_column(options.method)) {
+        columns.emplace_back(caption(name_of(options.method), ahead.ahead_s, ahead.chosen_db), picture);
       }
     }
     if (samples) {
@@ -302,9 +310,10 @@ void add_predict_command(CLI::App& app, int* exit_code) {
   command->add_option("--max-frames", surprise->max_frames, "Stop after so many; default: at the end, or at Ctrl-C")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40))
       ->needs(flag);
-  command->add_option("--bundle", surprise->bundle,
-                      "Folder of the networks of surprise and of samples; default: MAQ_PREDICTION_BUNDLE, then the one "
-                      "installed with this program");
+  command->add_option(
+      "--bundle", surprise->bundle,
+      "Folder of the networks of surprise, samples and --method network; default: MAQ_PREDICTION_BUNDLE, then the one "
+      "installed with this program");
   const auto for_pictures = [flag](CLI::Option* option) { option->excludes(flag); };
   for_pictures(command
                    ->add_option("--from", options->from,
@@ -316,9 +325,13 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       command
           ->add_option("-m,--method", options->method,
                        "last: the last frame; motion: everything moves on as it did; auto (default): both mixed, place "
-                       "by place, by how right they were so far")
-          ->transform(CLI::CheckedTransformer(std::map<std::string, maq_prediction_method>{
-              {"auto", MAQ_PREDICTION_AUTO}, {"last", MAQ_PREDICTION_LAST}, {"motion", MAQ_PREDICTION_MOTION}})));
+                       "by place, by how right they were so far; network: that, mended by a network, which is nearer "
+                       "to the truth far ahead")
+          ->transform(CLI::CheckedTransformer(
+              std::map<std::string, maq_prediction_method>{{"auto", MAQ_PREDICTION_AUTO},
+                                                           {"last", MAQ_PREDICTION_LAST},
+                                                           {"motion", MAQ_PREDICTION_MOTION},
+                                                           {"network", MAQ_PREDICTION_NETWORK}})));
   for_pictures(command->add_flag(
       "-c,--compare", options->compare,
       "Print the error (PSNR) of last and motion by time ahead, and draw truth and all of them side by "
@@ -356,6 +369,7 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"
       "  maquette predict clip.mp4 --from 40 --compare            # the figures alone\n"
       "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
+      "  maquette predict clip.mp4 --method network --compare --out mended.mp4\n"
       "  maquette predict clip.mp4 --samples 4 --temperature 0.7 --seed 3 --compare --out may.mp4\n"
       "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4\n"
       "  maquette predict camera: --surprise --events 6           # what stands out: cuts, a frozen or covered camera\n"

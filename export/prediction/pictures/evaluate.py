@@ -1,10 +1,12 @@
-"""How well the networks foresee pictures of held-out clips, by frames ahead, beside the last frame and motion alone.
+"""How well the networks foresee pictures of held-out clips, by frames ahead, beside the last frame, motion alone, and
+what the SDK foresees from both (`auto`).
 
     python -m export.prediction.pictures.evaluate --sets pushing --split val
 
 PSNR in dB at 64 x 64, mean of frames spread over all clips. A network of codes gives its expected picture by the
 decoder (`plain`), or adds to a picture what that differs from what the decoder makes of the picture's own codes
-(`over last`, `over motion`). `best` is the better of the last frame and motion; the networks are to beat it.
+(`over last`, `over motion`). `mender` mends what `auto` foresees. `best` is the better of the last frame and motion;
+the networks are to beat it.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from export.prediction.data import Clips, read_clips
 from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
 from export.prediction.parallel import ParallelTransformer, times_ahead
 from export.prediction.pictures.convolutional import ConvolutionalNet
+from export.prediction.pictures.foreseen import foreseen
 from export.prediction.pictures.picture_error import psnr_db
 from export.prediction.pictures.train_convolutional import load_convolutional
 from export.prediction.train_autoencoder import load_autoencoder
@@ -49,17 +52,17 @@ def over(base: Tensor, made: Tensor, autoencoder: Autoencoder) -> Tensor:
 
 @torch.no_grad()
 def pictures_of(
-    networks: Networks, frames: Tensor, by_motion: Tensor, fps: float, now: int, h: int
+    networks: Networks, frames: Tensor, by_motion: Tensor, by_auto: Tensor, fps: float, now: int, h: int
 ) -> dict[str, Tensor]:
     """What each method shows HORIZONS[h] frames after frame `now` of a clip uint8 [T, 64, 64, 3]."""
     last, moved = frames[now][None].float(), by_motion[now, h][None].float()
-    found = {"last": last, "motion": moved}
+    found = {"last": last, "motion": moved, "auto": by_auto[now, h][None].float()}
     times = times_ahead(torch.tensor([fps]), torch.tensor([float(HORIZONS[h])]))
     for name, net in (("convolutional", networks.convolutional), ("mender", networks.mender)):
         if net is not None:
             shown = [
                 frames[now + 1 - net.shape.frames : now + 1],
-                *([by_motion[now, h][None]] if net.shape.motion else []),
+                *([by_auto[now, h][None]] if net.shape.motion else []),
             ]
             found[name] = net.predicted(torch.cat(shown)[None], times)
     if networks.parallel is not None:
@@ -80,6 +83,7 @@ def measured(networks: Networks, clips: Clips, stride: int) -> Rows:
     for k in tqdm(range(len(clips)), unit="clip", leave=False):
         frames, fps = clips.frames[k], float(clips.fps[k])
         by_motion = torch.from_numpy(motion_pictures(MotionJob(k, frames.numpy(), fps)))
+        by_auto = torch.from_numpy(foreseen(frames.numpy(), fps))
         for now in range(3, len(frames) - 1, stride):
             for h, horizon in enumerate(HORIZONS):
                 if now + horizon >= len(frames):
@@ -87,7 +91,7 @@ def measured(networks: Networks, clips: Clips, stride: int) -> Rows:
                 truth = frames[now + horizon][None]
                 found = {
                     name: float(psnr_db(picture, truth)) for name, picture in
-                    pictures_of(networks, frames, by_motion, fps, now, h).items()
+                    pictures_of(networks, frames, by_motion, by_auto, fps, now, h).items()
                 }  # fmt: skip
                 found["best"] = max(found["last"], found["motion"])
                 for name, decibels in found.items():

@@ -27,7 +27,7 @@ from export.prediction.pictures.picture_error import psnr_db
 
 _BATCH = 64  # held-out frames at once
 _GAIN, _OFFSET = 0.15, 8.0  # standard deviations: natural logarithm, and grey levels
-_NOISE = 4.0  # squared grey levels: errors below this count little
+_NOISE = 1.0  # squared grey levels: errors below this count little
 
 
 class Training(run.Training):

@@ -45,7 +45,7 @@ WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
 FIGURES = (
     "prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second", *gaps.FIGURES, *drawn.FIGURES
 )  # fmt: skip
-METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
+METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto", "network": "auto, mended"}
 
 
 @dataclass(frozen=True)
@@ -170,13 +170,13 @@ def clip_films(folder: Path, most: int) -> list[Film]:
 def measure_film(film: Film, threads: int, has_ssim: bool = False) -> dict:
     frames = np.ascontiguousarray(film.bgr)
     height, width = frames.shape[1:3]
-    words = ["errors", str(width), str(height), str(film.fps), str(threads), *map(str, HORIZONS)]
+    words = ["errors", str(width), str(height), str(film.fps), str(threads), str(BUNDLE), *map(str, HORIZONS)]
     found = json.loads(run(words, frames.tobytes()))
     dis, dis_ms = dis_errors(frames)
     for row in found["horizons"]:
         row["dis_db"] = dis[row["frames"]]
     if has_ssim:
-        for name, values in structure_of(frames, film.fps, HORIZONS, threads).items():
+        for name, values in structure_of(frames, film.fps, HORIZONS, BUNDLE, threads).items():
             for row, value in zip(found["horizons"], values, strict=True):
                 row[f"{name}_ssim"] = value
     return {"film": film.name, "size_px": [width, height], "threads": threads, "dis_ms": dis_ms, **found}
@@ -258,7 +258,8 @@ def section(measured: dict) -> tuple[str, list]:
     waits = measured["waits"]
     parts: list = [
         "What a predictor makes of a stream 1, 3, 5 and 8 frames after it saw its latest: PSNR in dB (320 x 240). "
-        "Motion: ours; OpenCV DIS: constant velocity by its preset medium; auto: what an app gets without an option.",
+        "Motion: ours; OpenCV DIS: constant velocity by its preset medium; auto: what an app gets without an option; "
+        "mended: that changed by a network (MAQ_PREDICTION_NETWORK).",
         table_of([], measured["sets"]) if measured["sets"] else "No clip was there.",
     ]
     structure = ssim_table(measured["sets"])

@@ -19,7 +19,7 @@ from export.prediction.pictures.train_convolutional import load_convolutional
 GIVEN, MADE = 5, 11  # frames of a clip, as the published system has them
 SAMPLES = 16
 PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # of what is drawn with few samples; 1 has SAMPLES
-DRAWN = 3  # MAQ_NETWORK_DRAWN
+MENDED, DRAWN = 1, 3  # MAQ_NETWORK_MENDED, MAQ_NETWORK_DRAWN
 SEED = 1
 CONVOLUTIONAL = "convolutional"
 
@@ -34,9 +34,9 @@ def shown(predictor: maquette.Predictor, frames: np.ndarray, step_s: float) -> N
         predictor.push(np.ascontiguousarray(frame), k * step_s)
 
 
-def foreseen(name: str) -> Method:
-    """By a method without networks."""
-    predictor = maquette.Predictor(method=name, threads=1)
+def foreseen(name: str, **settings: object) -> Method:
+    """By a method that draws nothing."""
+    predictor = maquette.Predictor(method=name, threads=1, **settings)
 
     def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, None]:
         shown(predictor, frames, step_s)
@@ -86,6 +86,7 @@ def methods(bundle: Path, samples: int, weights: Path | None = None) -> dict[str
         "last frame": foreseen("last"),
         "motion": foreseen("motion"),
         "auto": foreseen("auto"),
+        "auto, mended": foreseen("network", network_mode=MENDED, bundle_path=bundle),
         "likeliest": drawn(1, bundle, temperature=0),
         "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
         **{f"likeliest, {passes} passes": drawn(1, bundle, temperature=0, passes=passes) for passes in PASSES},

@@ -117,7 +117,10 @@ def measure_pictures(
     document["gain_db"] = gained
     for name, own in decibels.items():
         document["psnr_db"][name] = [float(own[:, k - 1].mean()) for k in AHEAD]
-    figures = {"drawn_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"]}
+    figures = {
+        "drawn_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"],
+        "mended_gain_db": gained["auto, mended"],
+    }
     for name, (uncertain, errors) in uncertainties(clips, pictures, bits).items():
         each = uncertainty.by_frame(uncertain, errors)
         document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]

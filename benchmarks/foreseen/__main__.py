@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.foreseen import motion_error
 from benchmarks.foreseen.structure import structure_of
-from benchmarks.prediction import HORIZONS, clip_films
+from benchmarks.prediction import BUNDLE, HORIZONS, clip_films
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def main() -> None:
             if name in found:
                 print(f"{kind}, {found['clips']} clips | {says} | mean {found[name][0]:.2f} px, "
                       f"median {found[name][1]:.2f} px", flush=True)  # fmt: skip
-        rows = [structure_of(film.bgr, film.fps, HORIZONS) for film in clip_films(folder, options.clips)]
+        rows = [structure_of(film.bgr, film.fps, HORIZONS, BUNDLE) for film in clip_films(folder, options.clips)]
         for name in rows[0] if rows else ():
             means = np.mean([own[name] for own in rows], 0)
             print(f"{kind} | SSIM, {name} | " + " | ".join(f"{value:.4f}" for value in means), flush=True)

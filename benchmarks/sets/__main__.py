@@ -5,8 +5,9 @@
 
 Of validation clips: PSNR in dB of frames made codes and frames again, the share of codes that stay as they are from
 frame to frame, bits a code by frequency, by the table, by the table with what a stream's places learn, and by the
-transformer (int8, as shipped); then PSNR at 320 x 240 by frames ahead of the last frame, motion and `auto`, and what
-`auto` gains over the better of the two. Needs the built library and the program measure_prediction.
+transformer (int8, as shipped); then PSNR at 320 x 240 by frames ahead of the last frame, motion, `auto` and `auto`
+mended by the network, and what the latter two gain over the better of the others. Needs the built library and the
+program measure_prediction.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.prediction import BUNDLE, HORIZONS
-from benchmarks.sets.measure import gate_of, networks_on, pictures_on
+from benchmarks.sets.measure import JUDGED, gate_of, networks_on, pictures_on
 
 
 def main() -> None:
@@ -38,9 +39,13 @@ def main() -> None:
         found = pictures_on(options.data, kind, options.clips)
         for name, own in found.items():
             print(f"| {kind} | {name} | " + " | ".join(f"{value:.2f}" for value in own.mean(0)) + " |")
-        gained, losers, worst = gate_of(found)
-        print("| | auto over the better | " + " | ".join(f"{value:+.2f}" for value in gained) + " |")
-        print(f"{kind}: {losers} of {found['auto'].size} clips and times lose more than 0.1 dB, at most {-worst:.2f}")
+        for method in JUDGED:
+            gained, losers, worst = gate_of(found, method)
+            print(f"| | {method} over the better | " + " | ".join(f"{value:+.2f}" for value in gained) + " |")
+            print(
+                f"{kind}, {method}: {losers} of {found[method].size} clips and times lose more than 0.1 dB, at most "
+                f"{-worst:.2f}"
+            )
 
 
 if __name__ == "__main__":

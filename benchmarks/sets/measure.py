@@ -21,7 +21,8 @@ from export.prediction.train_transformer import held_out_frames
 from export.prediction.transformer import UNSEEN
 from quantization.transformer import bits_of_frames
 
-GATE_DB = -0.1  # auto over the better of the last frame and motion
+JUDGED = ("auto", "network")  # the latter: auto, mended
+GATE_DB = -0.1  # of these over the better of the last frame and motion
 
 
 def coded(clips: Clips, codes: PictureCodes) -> CodedClips:
@@ -83,13 +84,13 @@ def pictures_on(data: Path, kind: str, most: int, threads: int = 1) -> dict[str,
     if not films:
         raise SystemExit(f"No clips with frames of 320 x 240 in {data / kind / 'val'}: python -m export.clips.dataset")
     rows = [measure_film(film, threads)["horizons"] for film in tqdm(films, desc=kind, leave=False)]
-    return {m: np.array([[row[f"{m}_db"] for row in own] for own in rows]) for m in ("last", "motion", "auto")}
+    return {m: np.array([[row[f"{m}_db"] for row in own] for own in rows]) for m in ("last", "motion", *JUDGED)}
 
 
-def gate_of(found: dict[str, np.ndarray]) -> tuple[np.ndarray, int, float]:
-    """What `auto` gains over the better of the last frame and motion: of the set's means by time ahead; how many clips
-    and times ahead lose more than the gate, and the largest loss."""
+def gate_of(found: dict[str, np.ndarray], method: str) -> tuple[np.ndarray, int, float]:
+    """What a method gains over the better of the last frame and motion: of the set's means by time ahead; how many
+    clips and times ahead lose more than the gate, and the largest loss."""
     means = {name: own.mean(0) for name, own in found.items()}
-    gained = found["auto"] - np.maximum(found["last"], found["motion"])
-    of_means = means["auto"] - np.maximum(means["last"], means["motion"])
+    gained = found[method] - np.maximum(found["last"], found["motion"])
+    of_means = means[method] - np.maximum(means["last"], means["motion"])
     return of_means, int((gained < GATE_DB).sum()), float(gained.min())

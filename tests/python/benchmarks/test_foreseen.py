@@ -7,6 +7,7 @@ import pytest
 from benchmarks import prediction
 from benchmarks.foreseen import motion_error
 from benchmarks.foreseen.structure import structure_of
+from benchmarks.prediction import BUNDLE
 from export.clips.clip import Clip, Frames, write_clip
 
 needs_library = pytest.mark.skipif(
@@ -63,9 +64,9 @@ def test_a_program_that_was_not_built_is_told(monkeypatch, tmp_path):
 
 @needs_library
 def test_what_moves_evenly_is_more_alike_by_motion_than_by_the_last_frame():
-    found = structure_of(moving(2, frames=16), 30, (1, 3))
+    found = structure_of(moving(2, frames=16), 30, (1, 3), BUNDLE)
     assert set(found) == {"last", *prediction.METHODS}
-    for name in ("motion", "auto", "dis"):
+    for name in ("motion", "auto", "network", "dis"):
         assert all(own > last + 0.1 for own, last in zip(found[name], found["last"], strict=True)), name
     assert all(own > 0.9 for own in found["motion"])
 

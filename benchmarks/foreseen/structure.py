@@ -21,8 +21,8 @@ MENDED = 1  # MAQ_NETWORK_MENDED
 def structure_of(
     bgr: np.ndarray, fps: float, horizons: Sequence[int], bundle: Path, threads: int = 1
 ) -> dict[str, list[float]]:
-    """Of frames BGR uint8 [T, H, W, 3]: by method the mean SSIM of the pictures so many frames after the one that was seen
-    last. bundle: of the network that mends."""
+    """Of frames BGR uint8 [T, H, W, 3]: by method the mean SSIM of the pictures so many frames after the one that was
+    seen last. bundle: of the network that mends."""
     predictors = {name: maquette.Predictor(name, threads=threads) for name in ("last", "motion", "auto")}
     predictors["network"] = maquette.Predictor("network", network_mode=MENDED, bundle_path=bundle, threads=threads)
     rgb = np.ascontiguousarray(bgr[..., ::-1])

@@ -126,7 +126,7 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
 
     rng = np.random.default_rng(0)
     frames = torch.from_numpy(rng.integers(0, 255, (2, 16, 64, 64, 3)).astype(np.uint8))
-    known = {name: continuations.foreseen("last") for name in ("last frame", "motion", "auto")}
+    known = {name: continuations.foreseen("last") for name in ("last frame", "motion", "auto", "auto, mended")}
     bits = rng.random((continuations.MADE, 16, 16)).astype(np.float32)
 
     def drawn_by(samples):
@@ -146,5 +146,5 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
     assert document["frechet"]["frames"]["last frame"] == 1
     text = "\n".join(part if isinstance(part, str) else str(part) for part in drawn_tables(document))
     assert "of 2 clips" in text
-    assert document["gain_db"]["last frame"] == 0  # all three without networks are the last frame here
+    assert document["gain_db"]["auto, mended"] == 0  # all that draw nothing are the last frame here
     assert "'temperature 1, best of 16'" in text

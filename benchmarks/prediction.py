@@ -229,12 +229,18 @@ def mean_by_horizon(rows: list[dict], key: str) -> list[float]:
     return [float(np.mean([row["horizons"][i][key] for row in rows])) for i in range(len(HORIZONS))]
 
 
+def methods_in(sets: dict[str, dict]) -> list[str]:
+    """A report measured before has fewer."""
+    return [method for method in METHODS if all(method in means for means in sets.values())]
+
+
 def ssim_table(sets: dict[str, dict]) -> list[list[str]]:
     """A head and a row a set: SSIM by method and frames ahead; nothing of sets that were measured without."""
-    table = [["clips, SSIM", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values())]]
+    methods = methods_in(sets)
+    table = [["clips, SSIM", *(f"{METHODS[name]} +{horizon}" for horizon in HORIZONS for name in methods)]]
     for name, means in sets.items():
         if means.get("ssim"):
-            cells = [f"{means['ssim'][method][i]:.3f}" for i in range(len(HORIZONS)) for method in METHODS]
+            cells = [f"{means['ssim'][method][i]:.3f}" for i in range(len(HORIZONS)) for method in methods]
             table.append([f"mean of {means['clips']} ({name})", *cells])
     return table
 
@@ -242,13 +248,14 @@ def ssim_table(sets: dict[str, dict]) -> list[list[str]]:
 def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
     """A head and rows: of each clip and set, PSNR in dB by method and frames ahead, and how much of auto's pictures is
     motion's."""
-    table = [["clip", *(f"{says} +{horizon}" for horizon in HORIZONS for says in METHODS.values()), "motion in auto"]]
+    methods = methods_in(sets)
+    table = [["clip", *(f"{METHODS[name]} +{ahead}" for ahead in HORIZONS for name in methods), "motion in auto"]]
     for row in rows:
-        cells = [f"{ahead[f'{method}_db']:.1f}" for ahead in row["horizons"] for method in METHODS]
+        cells = [f"{ahead[f'{method}_db']:.1f}" for ahead in row["horizons"] for method in methods]
         taken = "/".join(f"{ahead['motion_fraction']:.0%}" for ahead in row["horizons"])
         table.append([row["film"], *cells, taken])
     for name, means in sets.items():
-        cells = [f"{means[method][i]:.1f}" for i in range(len(HORIZONS)) for method in METHODS]
+        cells = [f"{means[method][i]:.1f}" for i in range(len(HORIZONS)) for method in methods]
         table.append([f"mean of {means['clips']} ({name})", *cells, ""])
     return table
 

@@ -110,6 +110,24 @@ TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
   EXPECT_TRUE(run.seen().back().surprise.empty());
 }
 
+TEST(LivePrediction, ANetworkMendsWhatComesWhereThereIsOne) {
+  maquette::PredictionChoice choice;
+  choice.method = MAQ_PREDICTION_NETWORK;
+  for (const char* const bundle : {MAQ_TEST_DATA "/tiny_transformer/bundle", "/nowhere"}) {
+    choice.bundle = bundle;
+    PredictionRun run(choice);
+    run.live.open("stub:people?size=160x120&frames=12");
+    ASSERT_TRUE(run.until_ended());
+    EXPECT_FALSE(run.live.status().has_failed);
+    const bool is_there = choice.bundle != "/nowhere";
+    EXPECT_EQ(run.live.status().problem.empty(), is_there) << run.live.status().problem;
+    const maquette::PredictionFrame last = run.last();
+    EXPECT_EQ(last.number, 12u);
+    EXPECT_EQ(last.stats.networks_ms > 0, is_there);
+    EXPECT_EQ(maquette::text_of_method(last.stats).find(", mended") != std::string::npos, is_there);
+  }
+}
+
 maquette::PredictionChoice drawing_choice() {
   maquette::PredictionChoice choice;
   choice.finds_uncertainty = choice.draws_sample = true;

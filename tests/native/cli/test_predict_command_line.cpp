@@ -72,6 +72,21 @@ TEST_F(PredictCommandLine, MotionIsNearerToTheTruthThanTheLastFrame) {
   EXPECT_NEAR(document["frames"][4]["ahead_s"].get<double>(), 0.25, 1e-6);
 }
 
+TEST_F(PredictCommandLine, ANetworkChangesWhatAutoHas) {
+  const auto figures = [&](const std::string& arguments) {
+    const Outcome result = run("square.avi --from 12 --frames 2 --compare --json " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out);
+  };
+  const auto mended = figures("--method network --out row.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
+  EXPECT_EQ(mended["method"], "network");
+  EXPECT_NE(mended["frames"][0]["psnr_db"]["chosen"], figures("")["frames"][0]["psnr_db"]["chosen"]);
+  cv::VideoCapture clip(folder_.file("row.avi"));
+  EXPECT_EQ(clip.get(cv::CAP_PROP_FRAME_WIDTH), 4 * 160) << "truth, last, motion and that";
+  expect_failure("square.avi --compare --method network --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'",
+                 "no networks that foresee pictures");
+}
+
 TEST_F(PredictCommandLine, PicturesInAFolderAreMarkedInside) {
   const Outcome result = run("square.avi --from 9 --frames 3 --method motion --out pictures");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -194,7 +209,7 @@ TEST_F(PredictCommandLine, BenchMeasuresEachStageOfWhatIsPredicted) {
       EXPECT_EQ(warning.get<std::string>().find("nothing moved"), std::string::npos) << "the square does";
     }
   }
-  EXPECT_EQ(names.size(), 9u);
+  EXPECT_EQ(names.size(), 10u);
   EXPECT_EQ(names.front(), "surprise");
 }
 

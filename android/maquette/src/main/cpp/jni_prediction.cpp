@@ -47,21 +47,24 @@ MAQ_NATIVE_OF(NativePrediction, jlong, createPredictor)
   });
 }
 
-// `values` as in Predictor.Config, then in Predictor.Sampling without its seed.
-MAQ_NATIVE_OF(NativePrediction, jlong, createDrawingPredictor)
+// `values` as in Predictor.Config; where it draws, then as in Predictor.Sampling without its seed.
+MAQ_NATIVE_OF(NativePrediction, jlong, createNetworkPredictor)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values,
  jlong seed) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, 6);
+    const bool draws = env->GetArrayLength(values) > 3;
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, draws ? 6 : 3);
     maq_predictor_config config = predictor_config(from);
     bundle.put_into(config);
     config.method = MAQ_PREDICTION_NETWORK;
-    config.network_mode = MAQ_NETWORK_DRAWN;
-    config.temperature = float(from[3]);
-    config.top_k = maq_jni::count_of(from[4]);
-    config.passes = maq_jni::count_of(from[5]);
-    config.seed = uint64_t(seed);
+    config.network_mode = draws ? MAQ_NETWORK_DRAWN : MAQ_NETWORK_MENDED;
+    if (draws) {
+      config.temperature = float(from[3]);
+      config.top_k = maq_jni::count_of(from[4]);
+      config.passes = maq_jni::count_of(from[5]);
+      config.seed = uint64_t(seed);
+    }
     maq_predictor* predictor = nullptr;
     check(maq_predictor_create(object<maq_context>(context), &config, &predictor));
     return handle(predictor);

@@ -225,23 +225,24 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         handle.use { context -> Predictor(NativePrediction.createPredictor(context, config.values())) }
 
     /**
-     * A predictor that draws samples of what may come, as well: [Predictor.draw]. Loads the networks of prediction;
-     * takes some 10 ms, so not on the main thread.
+     * A predictor by networks, which it loads; takes some 10 ms, so not on the main thread.
      *
-     * @param config its method is not read: what it predicts is drawn.
+     * @param sampling how it draws samples of what may come ([Predictor.draw]); what it predicts is drawn then, too.
+     *   Null: it predicts what [Predictor.Method.AUTO] has, mended by a network, which is nearer to what comes.
+     * @param config its method is not read.
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
-     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task, or without a transformer).
+     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task, or without that network).
      */
     fun predictor(
         bundle: ModelBundle,
-        sampling: Predictor.Sampling = Predictor.Sampling(),
+        sampling: Predictor.Sampling? = Predictor.Sampling(),
         config: Predictor.Config = Predictor.Config(),
     ): Predictor =
         handle.use { context ->
-            val values = config.values() + sampling.values()
+            val values = config.values() + (sampling?.values() ?: doubleArrayOf())
             val (folder, names, buffers) = Triple(bundle.folder, bundle.names, bundle.buffers)
             Predictor(
-                NativePrediction.createDrawingPredictor(context, folder, names, buffers, values, sampling.seed),
+                NativePrediction.createNetworkPredictor(context, folder, names, buffers, values, sampling?.seed ?: 0),
             )
         }
 

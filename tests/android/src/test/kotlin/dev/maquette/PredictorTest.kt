@@ -102,6 +102,21 @@ class PredictorTest : AndroidTest() {
         }
 
     @Test
+    fun withoutSamplingANetworkMendsWhatComes() {
+        val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
+        maquette.predictor(networks, sampling = null).use { predictor ->
+            predictor.pushTexture(0..2)
+            predictor.predict(0.2).use {
+                assertEquals(200_000_000L, it.origin!!.horizonNs)
+                assertTrue(error(it, 16) < 6) // far from what stands still
+            }
+            assertTrue(predictor.stats.networksMs > 0)
+            assertEquals(0, predictor.stats.drawnCount)
+            failure(Status.UNSUPPORTED) { predictor.draw(1, 1, 0.1) }
+        }
+    }
+
+    @Test
     fun samplesAreDrawnEachByItselfAndSayWhereTheyAreUncertain() {
         val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
         val sampling = Predictor.Sampling(seed = -2)

@@ -11,8 +11,9 @@ internal object NativePrediction {
 
     @JvmStatic external fun createPredictor(context: Long, values: DoubleArray): Long
 
+    /** [values] without those of a sampling: it draws nothing. */
     @JvmStatic
-    external fun createDrawingPredictor(
+    external fun createNetworkPredictor(
         context: Long,
         folder: ByteArray?,
         names: Array<ByteArray>?,

@@ -128,7 +128,7 @@ def main() -> None:
     )
     parser.add_argument("--transformer", type=Path, help="its weights, whose table is taken; default: without one")
     parser.add_argument("--parallel", type=Path, help="weights of the parallel transformer; default: without one")
-    parser.add_argument("--mender", type=Path, help="weights of the network that mends what is foreseen; default: without one")
+    parser.add_argument("--mender", type=Path, help="weights of the network that mends; default: without one")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     options = parser.parse_args()

@@ -128,6 +128,7 @@ def measure_pictures(
     figures["uncertainty_rank"] = document["rank"]["mean of samples, their bits"][-1]
     document["frechet"] = frechet_ratios(pictures, truth, others)
     figures["drawn_frechet_ratio"] = document["frechet"]["changes"]["temperature 1"]
+    figures["mended_frechet_ratio"] = document["frechet"]["changes"]["auto, mended"]
     return document, figures
 
 

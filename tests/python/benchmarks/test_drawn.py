@@ -1,5 +1,7 @@
 """The benchmark of drawn frames: what its figures mean."""
 
+from pathlib import Path
+
 import maquette
 import numpy as np
 import pytest
@@ -151,3 +153,20 @@ def test_a_report_has_figures_of_all_gates_and_tables(monkeypatch):
     assert "of 2 clips" in text
     assert document["gain_db"]["auto, mended"] == 0  # all that draw nothing are the last frame here
     assert "'temperature 1, best of 16'" in text
+
+
+def test_other_runtimes_have_the_graphs_that_they_can():
+    pytest.importorskip("torch", reason="the extra `train` is not installed: scripts/make-venv.sh train,dev")
+    from benchmarks.drawn import runtimes
+    from benchmarks.prediction import BUNDLE
+
+    weights = (Path(f"export/weights/prediction-{name}.pt") for name in ("autoencoder", "mender"))
+    rows = {(row["name"], row["precision"]): row for row in runtimes.measure(BUNDLE, *weights, threads=1, rounds=1)}
+    ours = rows["Maquette", "int8"]
+    assert set(ours["ms"]) == {*runtimes.PICTURES, *runtimes.CODES}
+    assert ours["ours_int8_ratio"] == 1
+    in_torch = rows["PyTorch", "fp32"]
+    assert not in_torch["missing"], "its pictures are those of our float graphs"
+    assert set(in_torch["ms"]) == set(runtimes.PICTURES)
+    of_same = sum(ours["ms"][name] for name in in_torch["ms"])
+    assert in_torch["ours_int8_ratio"] == pytest.approx(of_same / in_torch["total_ms"], rel=1e-3)

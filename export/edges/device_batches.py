@@ -22,7 +22,7 @@ from export.solids.sensors import drawn
 SENSORS = 16384  # that a run deals from
 MADE_CROPS = 6144  # of scenes that are made meanwhile: the newest so many
 MADE_AT_ONCE = 8
-FIRST_S = 6.0  # at most, to make the first ones
+FIRST_S = 6.0  # at most, to make the first ones; some are made in any case
 TIME_FRACTION = 0.25  # of a run, for making more
 
 
@@ -88,6 +88,7 @@ class DeviceBatches(Batches):
             self._made = round(made_fraction * self.batch)
             start = time.monotonic()
             torch.manual_seed(self.seed)
+            self._make(device)
             while self.made_crops < MADE_CROPS // 4 and time.monotonic() - start < FIRST_S:
                 self._make(device)
         return self

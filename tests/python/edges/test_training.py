@@ -107,7 +107,7 @@ def test_batches_of_a_device_are_crops_mirrored_and_scaled_with_their_labels(mon
 
 
 def test_a_share_of_a_batch_is_of_scenes_made_meanwhile(monkeypatch, crops, tmp_path):
-    for name, value in (("MADE_AT_ONCE", 2), ("FIRST_S", 0.01), ("MADE_CROPS", 8), ("drawn", lambda rng: clean)):
+    for name, value in (("MADE_AT_ONCE", 2), ("FIRST_S", 0), ("MADE_CROPS", 8), ("drawn", lambda rng: clean)):
         monkeypatch.setattr(f"export.edges.device_batches.{name}", value)
     cpu = torch.device("cpu")
     batches = DeviceBatches(crops / "train", 32, 4, seed=1).moved(cpu, 0.5)

@@ -12,7 +12,7 @@ namespace {
 
 constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:people?count=2",
                                           "These people are rendered; drop a clip or a recording here."};
-constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait"};
+constexpr const char* kPredictionStages[] = {"brightness", "motion", "choice", "move on", "pixels", "wait", "network"};
 constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // of what drags and arrows turn elsewhere
 constexpr Reddening kSurpriseRed = {1, 8, 0.7f}, kUncertainRed = {1, 6, 0.6f};
@@ -45,7 +45,7 @@ bool NextView::update() {
   if (!frames_.take()) return false;
   painter_.set_scene(frame().next, frame().now, frame().drawn.picture);
   const maq_predictor_stats& s = frame().stats;
-  stages_.add({s.grey_ms, s.flow_ms, s.choice_ms, s.project_ms, s.fetch_ms, float(frame().waiting_ms)});
+  stages_.add({s.grey_ms, s.flow_ms, s.choice_ms, s.project_ms, s.fetch_ms, float(frame().waiting_ms), s.networks_ms});
   return true;
 }
 
@@ -135,6 +135,7 @@ void NextView::add_to_report(nlohmann::ordered_json* report) const {
                         {"motion_fraction", frame().stats.motion_fraction},
                         {"push_ms", frame().stats.push_ms},
                         {"predict_ms", frame().stats.predict_ms},
+                        {"networks_ms", double(frame().stats.networks_ms)},
                         {"now_is_predicted", frame().origin.kind == MAQ_FRAME_PREDICTED},
                         {"bridges_gaps", frame().bridges_gaps},
                         {"bridged_frames", frame().gaps.predicted_count},

@@ -70,6 +70,15 @@ def test_auto_says_how_much_of_the_picture_is_motions(tmp_path):
     assert (difference(shown) > 0.2) == (fraction > 0)
 
 
+def test_a_network_mends_what_comes_where_that_is_asked_for(tmp_path):
+    mended, auto = (show(tmp_path, "--next", PEOPLE, "--ahead", 400, "--method", method, "--frames", 20)
+                    for method in ("network", "auto"))  # fmt: skip
+    assert mended.report["problem"] == ""
+    assert mended.report["prediction"]["networks_ms"] > 0 == auto.report["prediction"]["networks_ms"]
+    pictures = [inside(shown.rectangle("next_px")) for shown in (mended, auto)]
+    assert np.abs(pictures[0] - pictures[1]).mean() > 0.1
+
+
 def test_of_a_photo_nothing_else_comes(tmp_path):
     shown = show(tmp_path, "--next", ROOT / "tests/media/photo.jpg", "--frames", 5)
     assert shown.report["states"][-1] == "ended"

@@ -36,8 +36,8 @@ class Training(run.Training):
         super().__init__(net, torch.optim.AdamW(net.parameters(), betas=(0.9, 0.99), weight_decay=0.01), bf16)
 
     def advance(self, clips: Clips, foreseen: Tensor | None, count: int, rate: float) -> dict[str, Tensor]:
-        """One step on `count` frames at random, at that learning rate. foreseen uint8 [N, T,
-        horizons, 64, 64, 3]: what is changed, instead of the last frame, where the network sees it.
+        """One step on `count` frames at random, at that learning rate. foreseen uint8 [N, T, horizons, 64, 64, 3]: what
+        is changed, instead of the last frame, where the network sees it.
 
         The loss is the squared error by that of the picture that is changed: hard clips and far times would have nearly
         all of a plain one.

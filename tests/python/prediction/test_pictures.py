@@ -28,18 +28,27 @@ def moving_square(count=2, frames=16):
     return Clips(film, torch.full((count,), 10.0), [f"moving/{k}" for k in range(count)])
 
 
+def learnt(training, clips, pictures, steps):
+    """Figures before and after so many steps on these clips."""
+
+    def figures():
+        return train_convolutional.figures_of(training.net.eval(), clips, pictures, 8)
+
+    before = figures()
+    training.net.train()
+    for step in range(steps):
+        seed_step(0, step)
+        training.advance(clips, pictures, 4, 3e-3)
+    return before, figures()
+
+
 def test_a_new_convolutional_network_repeats_the_last_frame_and_then_learns():
     clips = moving_square()
     torch.manual_seed(0)
     shape = ConvolutionalShape(widths=(8, 16, 32), blocks=2)
     training = train_convolutional.Training(shape)
-    before = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
+    before, after = learnt(training, clips, None, 60)
     assert before["network 4"] == pytest.approx(before["base 4"], abs=1e-3)
-    training.net.train()
-    for step in range(60):
-        seed_step(0, step)
-        training.advance(clips, None, 4, 3e-3)
-    after = train_convolutional.figures_of(training.net.eval(), clips, None, 8)
     assert after["network 8"] > after["base 8"] + 1
     assert ConvolutionalNet(shape).predicted(clips.frames[:1, :3], torch.zeros(1, 2)).shape == (1, 64, 64, 3)
 
@@ -54,12 +63,7 @@ def test_a_mender_begins_with_half_of_what_is_foreseen_and_learns_where_it_is_wr
         first = training.net.predicted(shown, torch.zeros(1, 2))
     half = 0.5 * (clips.frames[:1, 2].float() + 140)
     torch.testing.assert_close(first, half, atol=0.01, rtol=0)
-    before = train_convolutional.figures_of(training.net.eval(), clips, pictures, 8)
-    training.net.train()
-    for step in range(120):
-        seed_step(0, step)
-        training.advance(clips, pictures, 4, 3e-3)
-    after = train_convolutional.figures_of(training.net.eval(), clips, pictures, 8)
+    before, after = learnt(training, clips, pictures, 120)
     assert after["network 1"] > before["network 1"] + 5
 
 

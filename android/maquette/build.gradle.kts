@@ -5,7 +5,7 @@ plugins {
 }
 
 group = "dev.maquette"
-version = "0.2.0"
+version = "0.3.0"
 
 android {
     namespace = "dev.maquette"

@@ -11,7 +11,7 @@ android {
         minSdk = 26
         targetSdk = 35
         versionCode = 1
-        versionName = "0.2.0"
+        versionName = "0.3.0"
     }
     // ArCaptureActivity, apart from what is compiled without ARCore; and the outfit that the desktop demo has.
     sourceSets["main"].kotlin.srcDir("src/arcore/kotlin")

@@ -35,6 +35,6 @@ __all__ = [
 
 
 def sdk_version() -> str:
-    """The version of the library found at run time: "0.2.0"."""
+    """The version of the library found at run time: "0.3.0"."""
     n = native()
     return n.ffi.string(n.lib.maq_get_sdk_version()).decode()

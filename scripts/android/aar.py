@@ -1,7 +1,7 @@
 """Assembles the AAR of android/maquette from its parts, and checks what an app's build and Android's linker ask of it.
 
     python3 scripts/android/aar.py --classes CLASSES --d8 "java -cp r8.jar com.android.tools.r8.D8 ..." \
-        --native arm64-v8a build/android/arm64-v8a/*.so --version 0.2.0 --out build/android
+        --native arm64-v8a build/android/arm64-v8a/*.so --version 0.3.0 --out build/android
 
 Writes maquette-VERSION.aar, a Maven repository with it, and sizes.json, and prints the sizes. Fails, with a line for
 each, where

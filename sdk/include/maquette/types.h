@@ -16,7 +16,7 @@
 #endif
 
 #define MAQ_VERSION_MAJOR 0
-#define MAQ_VERSION_MINOR 2
+#define MAQ_VERSION_MINOR 3
 #define MAQ_VERSION_PATCH 0
 
 /* The version of these headers as one number, major * 10000 + minor * 100 + patch. An app passes it to
@@ -54,27 +54,45 @@ typedef enum maq_status {
 /* The id of a person who is not tracked. */
 #define MAQ_NO_ID (-1)
 
-/* For `threads` of dense pose, edges and heads: the number is measured when the networks are made, on the machine as it
- * is then. One of them runs on zeros with 1, 2, and so on up to the default's number of threads, and the fewest are
- * taken that are within 5 % of the fastest: the others would cost energy for nothing. This takes up to about half a
- * second, more where preparing the network and running it twice on each number takes longer; with one large core,
- * nothing. */
+/* For maq_model_options.threads: the number of threads is measured when the networks are created. One network runs on
+ * zeros with 1, 2, ... threads, up to the default number. The smallest number within 5 % of the fastest time is kept,
+ * because more threads would only cost energy. This takes up to half a second, more for large networks. */
 #define MAQ_THREADS_MEASURED (-1)
 
-/* What runs the layers of networks. Values never change meaning; new ones are added at the end. */
+/* The library that runs the layers of a network. Values never change meaning; new ones are added at the end. */
 typedef enum maq_provider {
-  MAQ_PROVIDER_CPU = 0,     /* ONNX Runtime's own kernels */
-  MAQ_PROVIDER_XNNPACK = 1, /* those of XNNPACK, for networks of floats, on the CPU */
+  MAQ_PROVIDER_CPU = 0,     /* default: ONNX Runtime's own kernels */
+  MAQ_PROVIDER_XNNPACK = 1, /* XNNPACK on the CPU, for networks of floats */
   MAQ_PROVIDER_NNAPI = 2    /* accelerators of an Android device; may be slower than the CPU: measure it */
 } maq_provider;
 
-/* A file in the app's memory, for systems without a file system to read it from (phones, browsers). The call that takes
- * it copies it: name and data may be freed when the call returns. */
+/* Whether idle threads of a network spin, waiting for the next layer. Values never change meaning. */
+typedef enum maq_spinning {
+  MAQ_SPINNING_DEFAULT = 0, /* the SDK's choice: MAQ_SPINNING_ON in this version */
+  MAQ_SPINNING_ON = 1,      /* they spin for a while: faster */
+  MAQ_SPINNING_OFF = 2      /* they sleep: saves energy */
+} maq_spinning;
+
+/* A file in the app's memory, for systems without a file system (phones, browsers). The call that takes it copies it:
+ * name and data may be freed when the call returns. */
 typedef struct maq_memory_file {
   const char* name; /* as in the folder: "manifest.json", "trunk.onnx" */
   const void* data;
   size_t size_bytes;
 } maq_memory_file;
+
+/* How the networks of a system are loaded and run: a member of each config whose system has networks. All zero is the
+ * default. The bundle is a folder with manifest.json, or its files in memory; set one of the two, or none to use the
+ * bundle installed with the library. Paths and files are copied. */
+typedef struct maq_model_options {
+  int32_t threads;       /* 1 to 64; 0: the machine's large cores, at most 4; MAQ_THREADS_MEASURED: measured */
+  maq_spinning spinning; /* default MAQ_SPINNING_DEFAULT */
+  maq_provider provider; /* default MAQ_PROVIDER_CPU. The CPU replaces a provider that is missing or that takes less
+                            than half of the network; the log says why. */
+  uint32_t bundle_file_count;          /* default 0 */
+  const char* bundle_path;             /* folder with manifest.json; default NULL */
+  const maq_memory_file* bundle_files; /* the bundle's files in memory; default NULL */
+} maq_model_options;
 
 /* Returns the status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
  * The text is static. Any thread. Does not fail or block. */
@@ -87,7 +105,7 @@ MAQ_API const char* maq_status_get_name(maq_status status);
  * Any thread, while `handle` is alive. Does not fail or block. */
 MAQ_API const char* maq_last_error(const void* handle);
 
-/* Return the version of the library found at run time ("0.2.0"), the git commit it was built from, and the options
+/* Return the version of the library found at run time ("0.3.0"), the git commit it was built from, and the options
  * it was built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
 MAQ_API const char* maq_get_sdk_version(void);
 MAQ_API const char* maq_get_git_commit(void);

@@ -57,7 +57,7 @@ const char* maq_get_git_commit(void) { return git_commit(); }
 const char* maq_get_build_options(void) { return build_options(); }
 
 maq_status maq_context_config_init(maq_context_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_context_config(), sizeof(maq_context_config));
+  return init_config(__func__, config, struct_size, default_context_config());
 }
 
 maq_status maq_context_create(uint32_t header_version, const maq_context_config* given, maq_context** context) {
@@ -65,8 +65,7 @@ maq_status maq_context_create(uint32_t header_version, const maq_context_config*
     // First of all: with other headers nothing else can be trusted.
     check_header_version(header_version);
     require_argument(context, "context");
-    const maq_context_config config =
-        read_config(given, "config", default_context_config(), sizeof(maq_context_config));
+    const maq_context_config config = read_config(given, "config", default_context_config());
     require_range("config.log_level", number_in(config.log_level), int32_t(MAQ_LOG_OFF), int32_t(MAQ_LOG_DEBUG));
     const char* library = config.onnxruntime_library;
     *context = new maq_context(

@@ -14,11 +14,6 @@ using namespace maq;
 
 namespace {
 
-// Of the struct without what came after the crops of people.
-constexpr size_t kFirstDensePoseConfigSize = offsetof(maq_densepose_config, provider);
-// Without the threads.
-constexpr size_t kFirstDensePoseStatsSize = offsetof(maq_densepose_stats, threads);
-
 maq_densepose_config default_densepose_config() {
   maq_densepose_config config{};
   config.struct_size = sizeof config;
@@ -46,7 +41,7 @@ const BodyPart* body_part(int32_t part) {
 namespace maq {
 
 maq_densepose_config read_densepose_config(const maq_densepose_config* given, const char* name) {
-  return read_config(given, name, default_densepose_config(), kFirstDensePoseConfigSize);
+  return read_config(given, name, default_densepose_config());
 }
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
@@ -103,7 +98,7 @@ void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]) {
 }
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_densepose_config(), kFirstDensePoseConfigSize);
+  return init_config(__func__, config, struct_size, default_densepose_config());
 }
 
 maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* given, maq_densepose** densepose) {
@@ -180,7 +175,7 @@ maq_status maq_densepose_result_get_person(const maq_densepose_result* result, u
     require_index("index", index, result->result.people.size());
     const Person& from = result->result.people[index];
     const maq_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, MAQ_NO_ID};
-    write_struct(person, "person", filled, sizeof(maq_person));
+    write_struct(person, "person", filled);
     return MAQ_OK;
   });
 }
@@ -238,13 +233,13 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.provider = from.provider;
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
-    write_struct(stats, "stats", filled, kFirstDensePoseStatsSize);
+    write_struct(stats, "stats", filled);
     return MAQ_OK;
   });
 }
 
 maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size) {
-  return init_config(__func__, drawing, struct_size, default_drawing(), sizeof(maq_densepose_drawing), "drawing");
+  return init_config(__func__, drawing, struct_size, default_drawing(), "drawing");
 }
 
 maq_status maq_densepose_result_draw(const maq_densepose_result* result, const maq_frame* frame,
@@ -254,7 +249,7 @@ maq_status maq_densepose_result_draw(const maq_densepose_result* result, const m
     require_argument(result, "result");
     require_argument(rgba, "rgba");
     if (frame != nullptr) require_argument(frame, "frame");
-    maq_densepose_drawing drawing = read_config(given, "drawing", default_drawing(), sizeof(maq_densepose_drawing));
+    maq_densepose_drawing drawing = read_config(given, "drawing", default_drawing());
     const DensePlanes& planes = result->result.planes;
     const ImageView* const image = frame == nullptr ? nullptr : &frame->frame.image;
     if (image != nullptr && (image->width_px != planes.width_px || image->height_px != planes.height_px)) {
@@ -303,8 +298,7 @@ maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_sur
     require_argument(densepose, "densepose");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = densepose->densepose->surface();
-    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
-                 sizeof(maq_densepose_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()});
     return MAQ_OK;
   });
 }

@@ -9,8 +9,6 @@ using namespace maq;
 
 namespace {
 
-// Of the structs' first release.
-constexpr size_t kFirstCurvesConfigSize = sizeof(maq_edges_curves_config);
 constexpr double kMaxRadiusPx = 1e6;
 
 // Points are handed out as triples of doubles.
@@ -54,7 +52,7 @@ void write_snap(const Snap& from, maq_edges_snap* snap) {
   write_vector(from.point, filled.point_m);
   filled.distance_px = from.distance_px;
   filled.angle_rad = from.angle_rad;
-  write_struct(snap, "snap", filled, sizeof(maq_edges_snap));
+  write_struct(snap, "snap", filled);
 }
 
 Vec3 read_vector(const double* from, const char* name) {
@@ -69,7 +67,7 @@ Vec3 read_vector(const double* from, const char* name) {
 }  // namespace
 
 CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char* name) {
-  const maq_edges_curves_config config = read_config(given, name, default_curves_config(), kFirstCurvesConfigSize);
+  const maq_edges_curves_config config = read_config(given, name, default_curves_config());
   require_range(concatenate(name, ".find_boxes"), config.find_boxes, 0, 1);
   CurveRequest request;
   request.finds_boxes = config.find_boxes == 1;
@@ -80,7 +78,7 @@ CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char
 }
 
 maq_status maq_edges_curves_config_init(maq_edges_curves_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_curves_config(), kFirstCurvesConfigSize);
+  return init_config(__func__, config, struct_size, default_curves_config());
 }
 
 maq_status maq_edges_result_find_curves(const maq_edges_result* result, const maq_edges_curves_config* config,
@@ -142,7 +140,7 @@ maq_status maq_edges_curves_get_curve(const maq_edges_curves* curves, uint32_t i
       write_vector(from.plane[i].normal, filled.sides[i].normal);
       filled.sides[i].offset_m = from.plane[i].offset_m;
     }
-    write_struct(curve, "curve", filled, sizeof(maq_edges_curve));
+    write_struct(curve, "curve", filled);
     return MAQ_OK;
   });
 }
@@ -155,7 +153,7 @@ maq_status maq_edges_curves_get_corner(const maq_edges_curves* curves, uint32_t 
     maq_edges_corner filled{};
     filled.curve_count = from.curve_count;
     write_vector(from.point, filled.point_m);
-    write_struct(corner, "corner", filled, sizeof(maq_edges_corner));
+    write_struct(corner, "corner", filled);
     return MAQ_OK;
   });
 }
@@ -173,7 +171,7 @@ maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint32_t ind
       filled.plus_minus_m[i] = from.plus_minus_m[i];
       write_vector(from.axis[i], filled.axes[i]);
     }
-    write_struct(box, "box", filled, sizeof(maq_edges_box));
+    write_struct(box, "box", filled);
     return MAQ_OK;
   });
 }
@@ -192,7 +190,7 @@ maq_status maq_edges_curves_get_stats(const maq_edges_curves* curves, maq_edges_
     filled.without_depth_count = from.without_depth;
     filled.not_fitted_count = from.not_fitted;
     filled.over_limit_count = from.over_limit;
-    write_struct(stats, "stats", filled, sizeof(maq_edges_curves_stats));
+    write_struct(stats, "stats", filled);
     return MAQ_OK;
   });
 }

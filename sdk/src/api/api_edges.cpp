@@ -13,10 +13,6 @@ using namespace maq;
 
 namespace {
 
-// Of the structs' first release; that of the stats without the threads.
-constexpr size_t kFirstEdgesConfigSize = sizeof(maq_edges_config),
-                 kFirstEdgesStatsSize = offsetof(maq_edges_stats, threads);
-
 maq_edges_config default_edges_config() {
   maq_edges_config config{};
   config.struct_size = sizeof config;
@@ -28,7 +24,7 @@ maq_edges_config default_edges_config() {
 }  // namespace
 
 maq_edges_config maq::read_edges_config(const maq_edges_config* given, const char* name) {
-  return read_config(given, name, default_edges_config(), kFirstEdgesConfigSize);
+  return read_config(given, name, default_edges_config());
 }
 
 EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* name) {
@@ -49,7 +45,7 @@ EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* na
 }
 
 maq_status maq_edges_config_init(maq_edges_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_edges_config(), kFirstEdgesConfigSize);
+  return init_config(__func__, config, struct_size, default_edges_config());
 }
 
 maq_status maq_edges_create(maq_context* context, const maq_edges_config* given, maq_edges** edges) {
@@ -110,7 +106,7 @@ maq_status maq_edges_result_get_field(const maq_edges_result* result, maq_edges_
     filled.height_px = from.height;
     filled.eps_r = from.eps_r;
     filled.intrinsics = {camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px, {}};
-    write_struct(field, "field", filled, sizeof(maq_edges_field));
+    write_struct(field, "field", filled);
     return MAQ_OK;
   });
 }
@@ -164,7 +160,7 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
     filled.averaged_pixel_count = from.averaged_pixels;
-    write_struct(stats, "stats", filled, kFirstEdgesStatsSize);
+    write_struct(stats, "stats", filled);
     return MAQ_OK;
   });
 }

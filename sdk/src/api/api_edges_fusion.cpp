@@ -15,8 +15,6 @@ using namespace maq;
 
 namespace {
 
-// Of the structs' first release.
-constexpr size_t kFirstFusionConfigSize = sizeof(maq_edges_fusion_config);
 constexpr size_t kCurvesPool = 4;
 constexpr float kFractionOfPoints = 0.9f;  // of the time of finish; curves take the rest
 
@@ -71,7 +69,7 @@ struct maq_edges_fusion : HandleOf<HandleKind::kEdgesFusion> {
 };
 
 maq_status maq_edges_fusion_config_init(maq_edges_fusion_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_fusion_config(), kFirstFusionConfigSize);
+  return init_config(__func__, config, struct_size, default_fusion_config());
 }
 
 maq_status maq_edges_fusion_create(maq_context* context, const maq_edges_fusion_config* given,
@@ -79,8 +77,7 @@ maq_status maq_edges_fusion_create(maq_context* context, const maq_edges_fusion_
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(fusion, "fusion");
-    const maq_edges_fusion_config config =
-        read_config(given, "config", default_fusion_config(), kFirstFusionConfigSize);
+    const maq_edges_fusion_config config = read_config(given, "config", default_fusion_config());
     fusion_options(config);  // checks it before threads start
     *fusion = new maq_edges_fusion(config);
     return MAQ_OK;
@@ -94,7 +91,7 @@ maq_status maq_edges_fusion_add_view(maq_edges_fusion* fusion, const maq_edges_r
   return guarded_alone(fusion, "fusion", __func__, [&] {
     require_argument(result, "result");
     require_argument(camera, "camera");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
+    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera));
     const PinholeCamera pose = pinhole_of(*camera);
     const EdgeField& field = result->result.field;
     const EdgeCurves& curves = fusion->extractor.extract(field);
@@ -152,7 +149,7 @@ maq_status maq_edges_fusion_get_info(const maq_edges_fusion* fusion, maq_edges_f
     filled.cell_m = fusion->found.cell_m;
     filled.eps_r = fusion->found.eps_r;
     filled.fusion_ms = fusion->fusion_ms;
-    write_struct(info, "info", filled, sizeof(maq_edges_fusion_info));
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }

@@ -38,7 +38,7 @@ maq_yuv_image default_yuv_image() {
 maq_status maq_frame_desc_init(maq_frame_desc* desc, uint32_t struct_size) {
   maq_frame_desc defaults{};
   defaults.clock = MAQ_CLOCK_MEDIA;
-  return init_config(__func__, desc, struct_size, defaults, sizeof(maq_frame_desc), "desc");
+  return init_config(__func__, desc, struct_size, defaults, "desc");
 }
 
 maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
@@ -47,7 +47,7 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
     require_argument(context, "context");
     require_argument(given, "desc");
     require_argument(frame, "frame");
-    const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{}, sizeof(maq_frame_desc));
+    const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{});
     require_range("desc.clock", number_in(desc.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
     auto handle = std::make_unique<maq_frame>();
     handle->frame.image = checked_image_view(desc);
@@ -62,7 +62,7 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
 }
 
 maq_status maq_yuv_image_init(maq_yuv_image* image, uint32_t struct_size) {
-  return init_config(__func__, image, struct_size, default_yuv_image(), sizeof(maq_yuv_image), "image");
+  return init_config(__func__, image, struct_size, default_yuv_image(), "image");
 }
 
 maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_image* image, maq_frame** frame) {
@@ -70,7 +70,7 @@ maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_image* imag
     require_argument(context, "context");
     require_argument(image, "image");
     require_argument(frame, "frame");
-    const maq_yuv_image given = read_config(image, "image", default_yuv_image(), sizeof(maq_yuv_image));
+    const maq_yuv_image given = read_config(image, "image", default_yuv_image());
     require_range("image.is_full_range", given.is_full_range, 0, 1);
     require_range("image.clock", number_in(given.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
     if (given.rotation_deg % 90 != 0 || given.rotation_deg < 0 || given.rotation_deg > 270) {
@@ -120,7 +120,7 @@ void maq_frame_release(maq_frame* frame) {
 maq_status maq_frame_get_desc(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
-    write_struct(desc, "desc", description(frame->frame.image, frame->frame), sizeof(maq_frame_desc));
+    write_struct(desc, "desc", description(frame->frame.image, frame->frame));
     return MAQ_OK;
   });
 }
@@ -141,7 +141,7 @@ maq_status maq_frame_get_origin(const maq_frame* frame, maq_frame_origin* origin
       filled.captured_timestamp_ns = from.captured_timestamp_ns;
       filled.captured_sequence = from.captured_sequence;
     }
-    write_struct(origin, "origin", filled, sizeof(maq_frame_origin));
+    write_struct(origin, "origin", filled);
     return MAQ_OK;
   });
 }
@@ -151,7 +151,7 @@ maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc) {
     require_argument(frame, "frame");
     const ImageView* depth = depth_of(frame->frame);
     if (depth == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame came without depth.");
-    write_struct(desc, "desc", description(*depth, frame->frame), sizeof(maq_frame_desc));
+    write_struct(desc, "desc", description(*depth, frame->frame));
     return MAQ_OK;
   });
 }

@@ -16,12 +16,6 @@ namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 constexpr double kMaxFrameBudgetMs = 60000;
-// Of the structs without the frame budget.
-constexpr size_t kFirstPipelineConfigSize = offsetof(maq_pipeline_config, nice) + sizeof(int32_t);
-constexpr size_t kFirstPipelineStatsSize = offsetof(maq_pipeline_stats, key_frame_interval);
-// Of the struct without edges, and without prediction.
-constexpr size_t kFirstResultSize = offsetof(maq_pipeline_result, edges);
-constexpr size_t kEdgesResultSize = offsetof(maq_pipeline_result, predicted);
 
 // Of the thread that asked, as with maq_last_error.
 thread_local std::string given_problem, given_uri;
@@ -199,7 +193,7 @@ struct maq_pipeline : HandleOf<HandleKind::kPipeline> {
 };
 
 maq_status maq_pipeline_config_init(maq_pipeline_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_pipeline_config(), kFirstPipelineConfigSize);
+  return init_config(__func__, config, struct_size, default_pipeline_config());
 }
 
 maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* given, maq_pipeline** pipeline) {
@@ -207,8 +201,7 @@ maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_config* 
     require_argument(context, "context");
     require_argument(given, "config");
     require_argument(pipeline, "pipeline");
-    const maq_pipeline_config config =
-        read_config(given, "config", default_pipeline_config(), kFirstPipelineConfigSize);
+    const maq_pipeline_config config = read_config(given, "config", default_pipeline_config());
     require_range("config.result_pool_size", config.result_pool_size, 1u, kMaxPoolSize);
     *pipeline = new maq_pipeline(config, context->state);
     return MAQ_OK;
@@ -293,7 +286,7 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
     require_argument(result, "result");
-    require_struct_size("result", result->struct_size, kFirstResultSize, sizeof(maq_pipeline_result));
+    require_struct_size("result", result->struct_size, sizeof(maq_pipeline_result));
     if (pipeline->has_callback) {
       throw Error(MAQ_ERROR_UNSUPPORTED, "The pipeline gives its results to config.result_callback.");
     }
@@ -310,7 +303,7 @@ maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_n
     if (status == MAQ_CANCELLED) {
       return keep_error(pipeline, status, nullptr, "The pipeline is stopped; start it with maq_pipeline_set_source.");
     }
-    if (status == MAQ_OK) write_struct(result, "result", handles.hand_over(output, times), kFirstResultSize);
+    if (status == MAQ_OK) write_struct(result, "result", handles.hand_over(output, times));
     return status;
   });
 }
@@ -319,10 +312,9 @@ void maq_pipeline_release_result(maq_pipeline_result* result) {
   if (result == nullptr) return;
   maq_frame_release(std::exchange(result->frame, nullptr));
   maq_densepose_result_release(std::exchange(result->densepose, nullptr));
-  if (result->struct_size < kEdgesResultSize) return;  // of an app that knows no edges
   maq_edges_result_release(std::exchange(result->edges, nullptr));
   maq_edges_curves_release(std::exchange(result->curves, nullptr));
-  if (result->struct_size == sizeof *result) maq_frame_release(std::exchange(result->predicted, nullptr));
+  maq_frame_release(std::exchange(result->predicted, nullptr));
 }
 
 maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info* info) {
@@ -331,8 +323,7 @@ maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info
     PipelineStatus now = pipeline->pipeline.status();
     given_problem = std::move(now.problem);
     given_uri = pipeline->pipeline.source_uri();
-    write_struct(info, "info", maq_pipeline_info{0, now.state, now.status, given_problem.c_str(), given_uri.c_str()},
-                 sizeof(maq_pipeline_info));
+    write_struct(info, "info", maq_pipeline_info{0, now.state, now.status, given_problem.c_str(), given_uri.c_str()});
     return MAQ_OK;
   });
 }
@@ -344,8 +335,7 @@ maq_status maq_pipeline_get_stats(const maq_pipeline* pipeline, maq_pipeline_sta
     write_struct(stats, "stats",
                  maq_pipeline_stats{0, from.results, from.dropped_results, from.dropped_frames, from.results_per_second,
                                     from.latest.wait_ms, from.latest.run_ms, from.latest.age_ms,
-                                    from.effort.key_frame_interval, from.effort.long_side_px},
-                 kFirstPipelineStatsSize);
+                                    from.effort.key_frame_interval, from.effort.long_side_px});
     return MAQ_OK;
   });
 }
@@ -355,8 +345,7 @@ maq_status maq_pipeline_get_surface(maq_pipeline* pipeline, maq_densepose_surfac
     require_argument(pipeline, "pipeline");
     require_argument(surface, "surface");
     const SurfaceGrid& grid = pipeline->pipeline.surface();
-    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()},
-                 sizeof(maq_densepose_surface));
+    write_struct(surface, "surface", maq_densepose_surface{0, grid.nodes, grid.points_m.data()});
     return MAQ_OK;
   });
 }

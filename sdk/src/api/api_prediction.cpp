@@ -128,15 +128,14 @@ NetworkPredictor& drawing(const maq_predictor* predictor) {
 }  // namespace
 
 maq_status maq_predictor_config_init(maq_predictor_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_predictor_config(), sizeof(maq_predictor_config));
+  return init_config(__func__, config, struct_size, default_predictor_config());
 }
 
 maq_status maq_predictor_create(maq_context* context, const maq_predictor_config* given, maq_predictor** predictor) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(predictor, "predictor");
-    const maq_predictor_config config =
-        read_config(given, "config", default_predictor_config(), sizeof(maq_predictor_config));
+    const maq_predictor_config config = read_config(given, "config", default_predictor_config());
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
     const PredictorSettings settings =
         predictor_settings(*context->state, config.threads, config.method, MAQ_PREDICTION_NETWORK);
@@ -231,14 +230,13 @@ maq_status maq_predictor_get_stats(const maq_predictor* predictor, maq_predictor
                             by_network != nullptr ? uint32_t(by_network->steps()) : 0u,
                             by_network != nullptr ? uint32_t(by_network->places()) : 0u,
                             has_run ? maq_network_mode(int(by_network->settings().mode) + 1) : MAQ_NETWORK_AUTO,
-                            uint32_t(counts.steps), uint32_t(counts.passes)},
-        sizeof(maq_predictor_stats));
+                            uint32_t(counts.steps), uint32_t(counts.passes)});
     return MAQ_OK;
   });
 }
 
 maq_status maq_concealer_config_init(maq_concealer_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_concealer_config(), sizeof(maq_concealer_config));
+  return init_config(__func__, config, struct_size, default_concealer_config());
 }
 
 maq_status maq_concealer_create(maq_context* context, maq_source* source, const maq_concealer_config* given,
@@ -247,8 +245,7 @@ maq_status maq_concealer_create(maq_context* context, maq_source* source, const 
     require_argument(context, "context");
     require_argument(source, "source");
     require_argument(concealer, "concealer");
-    const maq_concealer_config config =
-        read_config(given, "config", default_concealer_config(), sizeof(maq_concealer_config));
+    const maq_concealer_config config = read_config(given, "config", default_concealer_config());
     require_range("config.max_gap_ms", config.max_gap_ms, 1, 10000);
     require_range("config.frame_pool_size", config.frame_pool_size, 1u, 64u);
     const PredictorSettings predictor =
@@ -291,8 +288,7 @@ maq_status maq_concealer_get_stats(const maq_concealer* concealer, maq_concealer
     const ConcealerStats from = concealer->concealer.stats();
     write_struct(stats, "stats",
                  maq_concealer_stats{0, from.captured, from.predicted, from.late, from.dropped, from.latest_gap_ms,
-                                     from.latest_wait_ms, from.max_wait_ms},
-                 sizeof(maq_concealer_stats));
+                                     from.latest_wait_ms, from.max_wait_ms});
     return MAQ_OK;
   });
 }

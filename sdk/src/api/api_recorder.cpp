@@ -13,11 +13,8 @@ struct maq_recorder : HandleOf<HandleKind::kRecorder> {
   RecordingWriter writer;
 };
 
-// Of the struct's first release.
-static constexpr size_t kFirstRecorderConfigSize = offsetof(maq_recorder_config, keep_predicted);
-
 maq_status maq_recorder_config_init(maq_recorder_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, maq_recorder_config{}, kFirstRecorderConfigSize);
+  return init_config(__func__, config, struct_size, maq_recorder_config{});
 }
 
 maq_status maq_recorder_create(maq_context* context, const char* path, const maq_source* source,
@@ -26,7 +23,7 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
     require_argument(context, "context");
     require_argument(path, "path");
     require_argument(recorder, "recorder");
-    const maq_recorder_config config = read_config(given, "config", maq_recorder_config{}, kFirstRecorderConfigSize);
+    const maq_recorder_config config = read_config(given, "config", maq_recorder_config{});
     require_range("config.jpeg_quality", config.jpeg_quality, 0u, 100u);
     require_range("config.keep_predicted", config.keep_predicted, 0, 1);
     RecordingInfo info;
@@ -57,8 +54,7 @@ maq_status maq_recorder_finish(maq_recorder* recorder) {
 
 maq_status maq_recorder_get_info(const maq_recorder* recorder, maq_recorder_info* info) {
   return guarded_alone(recorder, "recorder", __func__, [&] {
-    write_struct(info, "info", maq_recorder_info{0, recorder->writer.frame_count(), recorder->writer.size_bytes()},
-                 sizeof(maq_recorder_info));
+    write_struct(info, "info", maq_recorder_info{0, recorder->writer.frame_count(), recorder->writer.size_bytes()});
     return MAQ_OK;
   });
 }

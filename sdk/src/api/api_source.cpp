@@ -11,10 +11,6 @@ namespace {
 constexpr const char* kConcealed = "A concealer takes the frames of this source; acquire them from it, or destroy it.";
 
 constexpr uint32_t kLargestPoolSize = 64;
-// Of the structs without what is for cameras.
-constexpr size_t kFirstSourceConfigSize = offsetof(maq_source_config, queue_length);
-constexpr size_t kFirstSourceInfoSize = offsetof(maq_source_info, dropped_frame_count);
-constexpr size_t kFirstSchemeSize = offsetof(maq_source_scheme, is_camera);
 
 maq_source_config default_source_config() {
   maq_source_config config{};
@@ -36,7 +32,7 @@ void require_control(const maq_control& control) {
 namespace maq {
 
 maq_source_config read_source_config(const maq_source_config* given, const char* name) {
-  return read_config(given, name, default_source_config(), kFirstSourceConfigSize);
+  return read_config(given, name, default_source_config());
 }
 
 SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log) {
@@ -65,7 +61,7 @@ SourceSettings source_settings(const maq_source_config& config, const char* name
 }  // namespace maq
 
 maq_status maq_source_config_init(maq_source_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_source_config(), kFirstSourceConfigSize);
+  return init_config(__func__, config, struct_size, default_source_config());
 }
 
 maq_status maq_source_create(maq_context* context, const char* uri, const maq_source_config* given,
@@ -105,7 +101,7 @@ maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) 
     filled.clock = from.clock;
     filled.frame_pool_size = uint32_t(source->frames.capacity());
     filled.dropped_frame_count = source->source->drops();
-    write_struct(info, "info", filled, kFirstSourceInfoSize);
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }
@@ -156,7 +152,7 @@ maq_status maq_source_get_control(maq_source* source, maq_control control, maq_c
     require_argument(source, "source");
     require_argument(info, "info");
     require_control(control);
-    write_struct(info, "info", source->source->control(control), sizeof(maq_control_info));
+    write_struct(info, "info", source->source->control(control));
     return MAQ_OK;
   });
 }
@@ -192,8 +188,7 @@ maq_status maq_source_get_scheme(uint32_t index, maq_source_scheme* scheme) {
     const std::vector<SourceScheme>& schemes = source_schemes();
     require_index("index", index, schemes.size());
     const SourceScheme& from = schemes[index];
-    write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary, from.is_camera ? 1 : 0},
-                 kFirstSchemeSize);
+    write_struct(scheme, "scheme", maq_source_scheme{0, from.name, from.example, from.summary, from.is_camera ? 1 : 0});
     return MAQ_OK;
   });
 }
@@ -222,8 +217,7 @@ maq_status maq_camera_list_get_camera(const maq_camera_list* list, uint32_t inde
     const CameraListing& from = list->cameras[index];
     write_struct(info, "info",
                  maq_camera_info{0, from.uri.c_str(), from.name.c_str(), from.bus.c_str(), from.status,
-                                 from.problem.c_str(), uint32_t(from.modes.size())},
-                 sizeof(maq_camera_info));
+                                 from.problem.c_str(), uint32_t(from.modes.size())});
     return MAQ_OK;
   });
 }
@@ -242,7 +236,7 @@ maq_status maq_camera_list_get_mode(const maq_camera_list* list, uint32_t index,
     filled.width_px = from.width_px;
     filled.height_px = from.height_px;
     filled.fps = from.fps;
-    write_struct(mode, "mode", filled, sizeof(maq_camera_mode));
+    write_struct(mode, "mode", filled);
     return MAQ_OK;
   });
 }

@@ -48,15 +48,14 @@ SurpriseNetworks open_networks(ContextState& state, const maq_surprise_config& c
 }  // namespace
 
 maq_status maq_surprise_config_init(maq_surprise_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_surprise_config(), sizeof(maq_surprise_config));
+  return init_config(__func__, config, struct_size, default_surprise_config());
 }
 
 maq_status maq_surprise_create(maq_context* context, const maq_surprise_config* given, maq_surprise** surprise) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(surprise, "surprise");
-    const maq_surprise_config config =
-        read_config(given, "config", default_surprise_config(), sizeof(maq_surprise_config));
+    const maq_surprise_config config = read_config(given, "config", default_surprise_config());
     if (!(config.event_ratio > 1 && config.event_ratio <= 1e6f)) {
       throw ArgumentError("config.event_ratio is ", config.event_ratio, ", but must be above 1, and at most 1e6.");
     }
@@ -81,7 +80,7 @@ maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq
   return guarded_alone(surprise, "surprise", __func__, [&] {
     require_argument(frame, "frame");
     require_argument(score, "score");
-    require_struct_size("score", score->struct_size, sizeof *score, sizeof *score);
+    require_struct_size("score", score->struct_size, sizeof *score);
     const Stopwatch whole;
     const SurpriseScore found = surprise->surprise.push(frame->frame);
     surprise->push_ms = float(whole.elapsed_ms());
@@ -95,8 +94,7 @@ maq_status maq_surprise_push(maq_surprise* surprise, const maq_frame* frame, maq
     const auto side = int32_t(surprise->surprise.encoder()->codes().side);
     write_struct(score, "score",
                  maq_surprise_score{0, side, side, found.bits, found.ratio, is_event ? 1 : 0, found.is_cut ? 1 : 0,
-                                    found.is_start ? 1 : 0},
-                 sizeof(maq_surprise_score));
+                                    found.is_start ? 1 : 0});
     return MAQ_OK;
   });
 }
@@ -143,8 +141,7 @@ maq_status maq_surprise_get_stats(const maq_surprise* surprise, maq_surprise_sta
     write_struct(stats, "stats",
                  maq_surprise_stats{0, times.encoder.resize_ms, times.encoder.network_ms, times.encoder.nearest_ms,
                                     surprise->push_ms, surprise->surprise.encoder()->threads(), surprise->pushed,
-                                    surprise->events, surprise->starts, times.transformer_ms},
-                 sizeof(maq_surprise_stats));
+                                    surprise->events, surprise->starts, times.transformer_ms});
     return MAQ_OK;
   });
 }

@@ -117,11 +117,11 @@ inline void require_index(const char* name, uint32_t index, size_t count) {
   if (index >= count) throw ArgumentError(name, " is ", index, ", but there are ", count, " (from 0).");
 }
 
-// Structs grow at their end. `smallest` is the size of the struct's first release: whatever lies between that and this
-// library's size is an older struct; a larger one comes from newer headers and may ask for what this library cannot do.
-inline void require_struct_size(const char* name, uint32_t size, size_t smallest, size_t largest) {
-  if (size < smallest || size > largest) {
-    throw ArgumentError(name, ".struct_size is ", size, ", but this library knows ", smallest, " to ", largest,
+// Headers and library of one minor version agree on the size of each struct (maq_context_create checks the version), so
+// another size means that the caller did not set struct_size.
+inline void require_struct_size(const char* name, uint32_t size, size_t expected) {
+  if (size != expected) {
+    throw ArgumentError(name, ".struct_size is ", size, ", but this library expects ", expected,
                         " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
   }
 }
@@ -149,38 +149,35 @@ void require_threads(const Name& name, int32_t threads, int32_t max) {
                       MAQ_THREADS_MEASURED, ").");
 }
 
-// The caller's config on top of the defaults.
+// Returns the caller's config, or the defaults for NULL.
 template <class T>
-T read_config(const T* given, const char* name, const T& defaults, size_t smallest) {
-  T config = defaults;
-  if (given == nullptr) return config;
-  require_struct_size(name, given->struct_size, smallest, sizeof(T));
-  std::memcpy(&config, given, given->struct_size);
-  return config;
+T read_config(const T* given, const char* name, const T& defaults) {
+  if (given == nullptr) return defaults;
+  require_struct_size(name, given->struct_size, sizeof(T));
+  return *given;
 }
 
-// As much of `value` as the caller's struct has room for; its struct_size stays.
+// Copies `value` to the caller's struct, whose struct_size was set by the caller.
 template <class T>
-void write_struct(T* target, const char* name, T value, size_t smallest) {
+void write_struct(T* target, const char* name, T value) {
   require_argument(target, name);
-  require_struct_size(name, target->struct_size, smallest, sizeof(T));
-  value.struct_size = target->struct_size;
-  std::memcpy(target, &value, target->struct_size);
+  require_struct_size(name, target->struct_size, sizeof(T));
+  value.struct_size = sizeof(T);
+  *target = value;
 }
 
-// For the `_init` functions, whose parameters are `name` and struct_size.
+// Implements the `_init` functions, whose parameters are `name` and struct_size.
 template <class T>
-maq_status init_config(const char* function, T* config, uint32_t struct_size, const T& defaults, size_t smallest,
+maq_status init_config(const char* function, T* config, uint32_t struct_size, const T& defaults,
                        const char* name = "config") {
   return guarded(nullptr, function, [&] {
     require_argument(config, name);
-    if (struct_size < smallest || struct_size > sizeof(T)) {
-      throw ArgumentError("struct_size is ", struct_size, ", but this library knows ", smallest, " to ", sizeof(T),
+    if (struct_size != sizeof(T)) {
+      throw ArgumentError("struct_size is ", struct_size, ", but this library expects ", sizeof(T),
                           " bytes; give sizeof the struct, of headers that fit the library.");
     }
-    T filled = defaults;
-    filled.struct_size = struct_size;
-    std::memcpy(config, &filled, struct_size);
+    *config = defaults;
+    config->struct_size = struct_size;
     return MAQ_OK;
   });
 }

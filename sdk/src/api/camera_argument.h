@@ -30,7 +30,7 @@ inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
 
 // Of a picture to be rendered.
 inline PinholeCamera undistorted_pinhole_of(const maq_pinhole_camera& given) {
-  require_struct_size("camera", given.struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
+  require_struct_size("camera", given.struct_size, sizeof(maq_pinhole_camera));
   if (is_distorted(given.intrinsics)) {
     throw ArgumentError("camera.intrinsics.distortion is not 0; pictures are rendered without distortion.");
   }

@@ -58,17 +58,6 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
             MAQ_ERROR_INVALID_ARGUMENT);
 }
 
-TEST(ApiDensePose, AConfigFromBeforeProvidersIsTaken) {
-  const uint32_t old_size = offsetof(maq_densepose_config, provider);
-  maq_densepose_config config;
-  reinterpret_cast<int32_t&>(config.provider) = 99;  // what lies behind the older struct
-  ASSERT_EQ(maq_densepose_config_init(&config, old_size), MAQ_OK);
-  EXPECT_EQ(config.struct_size, old_size);
-  config.bundle_path = kBundle;
-  const maquette::Context context;
-  EXPECT_NO_THROW(maquette::DensePose(context, config));
-}
-
 maquette::DensePose with_threads(const maquette::Context& context, int threads) {
   maq_densepose_config config = maquette::default_densepose_config();
   config.bundle_path = kBundle;
@@ -109,18 +98,6 @@ TEST(ApiDensePose, OnOneCoreOneThreadIsMeasured) {
   const maq_densepose_stats stats = densepose.run(maquette::Frame(context, image.desc)).stats();
   EXPECT_EQ(stats.threads, 1);
   EXPECT_EQ(stats.is_threads_measured, 1);
-}
-
-TEST(ApiDensePose, StatsFromBeforeThreadsAreFilled) {
-  const maquette::Context context;
-  maquette::DensePose densepose = with_threads(context, 2);
-  const RedCell image;
-  const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
-  maq_densepose_stats stats{};
-  stats.struct_size = offsetof(maq_densepose_stats, threads);
-  ASSERT_EQ(maq_densepose_result_get_stats(result.get(), &stats), MAQ_OK);
-  EXPECT_EQ(stats.person_count, 1);
-  EXPECT_EQ(stats.threads, 0) << "behind the older struct";
 }
 
 TEST(ApiDensePose, ALogCallbackThatThrowsFailsNothing) {

@@ -217,24 +217,6 @@ TEST_F(EdgesPipeline, ABundleOfAnotherTaskFailsAndTheRightOneGoesOn) {
   EXPECT_TRUE(live.next(kLongEnoughNs)->edges);
 }
 
-TEST_F(EdgesPipeline, AResultOfAnAppThatKnowsNoEdgesIsTaken) {
-  maq_densepose_config people = maquette::default_densepose_config();
-  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &people;
-  maquette::Pipeline live(context, config);
-  live.set_source("stub:pattern?size=64x48");
-  maq_pipeline_result result;
-  std::memset(&result, 0x5a, sizeof result);
-  result.struct_size = offsetof(maq_pipeline_result, edges);
-  ASSERT_EQ(maq_pipeline_acquire_result(live.get(), kLongEnoughNs, &result), MAQ_OK);
-  EXPECT_NE(result.densepose, nullptr);
-  maq_pipeline_release_result(&result);
-  uint8_t beyond[sizeof result - offsetof(maq_pipeline_result, edges)];
-  std::memcpy(beyond, &result.edges, sizeof beyond);
-  for (const uint8_t byte : beyond) EXPECT_EQ(byte, 0x5a) << "is not its";
-}
-
 TEST_F(EdgesPipeline, BearsCallsFromManyThreads) {
   maquette::Pipeline live = pipeline(true);
   live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=500");

@@ -184,23 +184,4 @@ TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
   refused(live.get(), right.get(), 0.1, reinterpret_cast<const maq_surprise*>(right.get()), "surprise");
 }
 
-TEST_F(PredictionPipeline, AResultOfAnAppThatKnowsNoPredictionIsTakenAndReleased) {
-  maq_densepose_config people = maquette::default_densepose_config();
-  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &people;
-  maquette::Pipeline live(context, config);
-  live.set_source("stub:pattern?size=64x48");
-  maq_pipeline_result result;
-  std::memset(&result, 0x5a, sizeof result);
-  result.struct_size = offsetof(maq_pipeline_result, predicted);
-  ASSERT_EQ(maq_pipeline_acquire_result(live.get(), kPatienceNs, &result), MAQ_OK);
-  EXPECT_NE(result.densepose, nullptr);
-  EXPECT_EQ(result.curves, nullptr);
-  maq_pipeline_release_result(&result);
-  uint8_t beyond[sizeof result - offsetof(maq_pipeline_result, predicted)];
-  std::memcpy(beyond, &result.predicted, sizeof beyond);
-  for (const uint8_t byte : beyond) EXPECT_EQ(byte, 0x5a) << "is not its";
-}
-
 }  // namespace

@@ -10,7 +10,7 @@ DOCUMENT = {
         "densepose": {"libraries": ["libmaquette.so.0.2", "libc.so.6", "libdl.so.2"], "cpu_ms": [200.0]},
     },
     "files": {
-        "library": {"name": "libmaquette.so.0.2.0", "bytes": 1_300_000, "needed": ["libc.so.6"]},
+        "library": {"name": "libmaquette.so.0.3.0", "bytes": 1_300_000, "needed": ["libc.so.6"]},
         "files_library": {"name": "libmaquette_files.so", "bytes": 20_000, "needed": ["libopencv_imgcodecs.so.406"]},
     },
     "warnings": [],

@@ -24,8 +24,6 @@ std::vector<float> in_metres(std::vector<float> decimetres) {
   return decimetres;
 }
 
-// Of the structs' first release.
-constexpr size_t kFirstMeshOptionsSize = sizeof(maq_head_mesh_options), kFirstMeshSize = sizeof(maq_head_mesh);
 constexpr uint32_t kDefaultTriangles = 60000, kMinTriangles = 100;
 
 maq_head_mesh_options default_mesh_options() {
@@ -85,7 +83,7 @@ const std::vector<uint8_t>& texture_of(const maq_head& head) {
 }
 
 const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given) {
-  const maq_head_mesh_options options = read_config(given, "options", default_mesh_options(), kFirstMeshOptionsSize);
+  const maq_head_mesh_options options = read_config(given, "options", default_mesh_options());
   const int32_t topology = number_in(options.topology);
   require_range("options.topology", topology, int32_t(MAQ_HEAD_TOPOLOGY_FIELD), int32_t(MAQ_HEAD_TOPOLOGY_TEMPLATE));
   const head::SurfaceOptions wanted = surface_options(options);
@@ -180,7 +178,7 @@ maq_status maq_head_get_info(const maq_head* head, maq_head_info* info) {
     filled.scale = maq_head_scale(from.scale.source);
     filled.scale_sigma = float(from.scale.sigma / from.scale.metres_per_unit);
     filled.texture_px = uint32_t(from.texture.side_px);
-    write_struct(info, "info", filled, sizeof(maq_head_info));
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }
@@ -206,19 +204,19 @@ maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_hea
     filled.point_m[0] = place.point.x * metres;
     filled.point_m[1] = place.point.y * metres;
     filled.point_m[2] = place.point.z * metres;
-    write_struct(landmark, "landmark", filled, sizeof(maq_head_landmark));
+    write_struct(landmark, "landmark", filled);
     return MAQ_OK;
   });
 }
 
 maq_status maq_head_mesh_options_init(maq_head_mesh_options* options, uint32_t struct_size) {
-  return init_config(__func__, options, struct_size, default_mesh_options(), kFirstMeshOptionsSize, "options");
+  return init_config(__func__, options, struct_size, default_mesh_options(), "options");
 }
 
 maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* options, maq_head_mesh* mesh) {
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(mesh, "mesh");
-    require_struct_size("mesh", mesh->struct_size, kFirstMeshSize, sizeof(maq_head_mesh));
+    require_struct_size("mesh", mesh->struct_size, sizeof(maq_head_mesh));
     const head::HeadMesh& made = mesh_of(*head, options);
     maq_head_mesh filled{};
     filled.vertex_count = uint32_t(made.vertex_count());
@@ -236,7 +234,7 @@ maq_status maq_head_get_mesh(maq_head* head, const maq_head_mesh_options* option
     }
     filled.morph_target_count = uint32_t(made.morph_targets.size());
     filled.simplification_error_m = float(head->mesh_stats.error_m);
-    write_struct(mesh, "mesh", filled, kFirstMeshSize);
+    write_struct(mesh, "mesh", filled);
     return MAQ_OK;
   });
 }
@@ -251,7 +249,7 @@ maq_status maq_head_get_morph_target(const maq_head* head, uint32_t index, maq_h
     filled.name = from.name.c_str();
     filled.vertices = from.vertices.data();
     filled.moves_m = head->morph_moves_m[index].data();
-    write_struct(target, "target", filled, sizeof(maq_head_morph_target));
+    write_struct(target, "target", filled);
     return MAQ_OK;
   });
 }

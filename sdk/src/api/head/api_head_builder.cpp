@@ -13,9 +13,6 @@ using namespace maq;
 
 namespace {
 
-// Of the structs' first release.
-constexpr size_t kFirstHeadConfigSize = sizeof(maq_head_config), kFirstPhotoSize = sizeof(maq_head_photo);
-
 maq_head_config default_head_builder_config() {
   maq_head_config config{};
   config.struct_size = sizeof config;
@@ -46,18 +43,18 @@ struct maq_head_builder : HandleOf<HandleKind::kHeadBuilder> {
 };
 
 maq_status maq_head_config_init(maq_head_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_head_builder_config(), kFirstHeadConfigSize);
+  return init_config(__func__, config, struct_size, default_head_builder_config());
 }
 
 maq_status maq_head_photo_init(maq_head_photo* photo, uint32_t struct_size) {
-  return init_config(__func__, photo, struct_size, default_photo(), kFirstPhotoSize, "photo");
+  return init_config(__func__, photo, struct_size, default_photo(), "photo");
 }
 
 maq_status maq_head_builder_create(maq_context* context, const maq_head_config* given, maq_head_builder** builder) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(builder, "builder");
-    const maq_head_config config = read_config(given, "config", default_head_builder_config(), kFirstHeadConfigSize);
+    const maq_head_config config = read_config(given, "config", default_head_builder_config());
     SessionSettings settings = session_settings(config);
     if (config.texture_px != 0) {
       require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),
@@ -83,7 +80,7 @@ void maq_head_builder_destroy(maq_head_builder* builder) { destroy(builder, "bui
 maq_status maq_head_builder_add_photo(maq_head_builder* builder, const maq_frame* frame, const maq_head_photo* photo) {
   return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(frame, "frame");
-    const maq_head_photo known = read_config(photo, "photo", default_photo(), kFirstPhotoSize);
+    const maq_head_photo known = read_config(photo, "photo", default_photo());
     head::PhotoHints hints;
     std::copy_n(known.box_px, 4, hints.box_px.begin());
     hints.roll_rad = double(known.roll_rad);
@@ -156,7 +153,7 @@ maq_status maq_head_builder_get_stats(const maq_head_builder* builder, maq_head_
     filled.step_count = from.steps;
     filled.provider = builder->builder->provider();
     filled.threads = builder->builder->threads();
-    write_struct(stats, "stats", filled, sizeof(maq_head_stats));
+    write_struct(stats, "stats", filled);
     return MAQ_OK;
   });
 }
@@ -171,7 +168,7 @@ maq_status maq_head_builder_get_photo(const maq_head_builder* builder, uint32_t 
     filled.is_used = from.is_used ? 1 : 0;
     filled.focal_px = float(from.focal_px);
     filled.rms_px = float(from.rms_px);
-    write_struct(info, "info", filled, sizeof(maq_head_photo_info));
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }

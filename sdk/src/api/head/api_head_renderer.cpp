@@ -80,13 +80,13 @@ maq_status maq_head_get_camera(const maq_head* head, uint32_t index, maq_pinhole
     std::copy(from.head_to_camera.rotation.begin(), from.head_to_camera.rotation.end(), made.rotation.begin());
     const Vec3 centre = head->head.scale.metres_per_unit * head::inverse(from.head_to_camera).translation;
     made.centre = {centre.x, centre.y, centre.z};
-    write_struct(camera, "camera", camera_of(made), sizeof(maq_pinhole_camera));
+    write_struct(camera, "camera", camera_of(made));
     return MAQ_OK;
   });
 }
 
 maq_status maq_head_renderer_config_init(maq_head_renderer_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_head_renderer_config(), sizeof(maq_head_renderer_config));
+  return init_config(__func__, config, struct_size, default_head_renderer_config());
 }
 
 maq_status maq_head_renderer_create(maq_context* context, const maq_head_renderer_config* given, maq_head* head,
@@ -94,8 +94,7 @@ maq_status maq_head_renderer_create(maq_context* context, const maq_head_rendere
   return guarded_alone(head, "head", __func__, [&] {
     require_argument(context, "context");
     require_argument(renderer, "renderer");
-    const maq_head_renderer_config config =
-        read_config(given, "config", default_head_renderer_config(), sizeof(maq_head_renderer_config));
+    const maq_head_renderer_config config = read_config(given, "config", default_head_renderer_config());
     const head::HeadRenderOptions options = options_of(config);
     const head::HeadMesh& mesh = mesh_of(*head, config.mesh);
     std::optional<head::MeshTexture> texture;
@@ -116,7 +115,7 @@ maq_status maq_head_renderer_get_camera(const maq_head_renderer* renderer, doubl
   return guarded(renderer, __func__, [&] {
     require_argument(renderer, "renderer");
     const PinholeCamera made = renderer->renderer.orbit_camera(yaw_rad, pitch_rad, width_px, height_px);
-    write_struct(camera, "camera", camera_of(made), sizeof(maq_pinhole_camera));
+    write_struct(camera, "camera", camera_of(made));
     return MAQ_OK;
   });
 }

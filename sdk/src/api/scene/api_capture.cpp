@@ -30,7 +30,7 @@ maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* in
     filled.point_count = capture->capture.cloud.count();
     filled.drop_count = uint32_t(capture->dropped.size());
     std::copy_n(capture->capture.up.begin(), 3, filled.up);
-    write_struct(info, "info", filled, sizeof(maq_capture_info));
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }
@@ -46,7 +46,7 @@ maq_status maq_capture_get_view(const maq_capture* capture, uint32_t index, maq_
     filled.name = from.name.c_str();
     filled.camera = camera_of(from.camera);
     filled.has_depth = from.depth_path.empty() ? 0 : 1;
-    write_struct(view, "view", filled, sizeof(maq_capture_view));
+    write_struct(view, "view", filled);
     return MAQ_OK;
   });
 }
@@ -56,7 +56,7 @@ maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t index, maq_
     require_argument(capture, "capture");
     require_index("index", index, capture->dropped.size());
     const maq_capture_drop filled{0, capture->dropped[index].c_str(), capture->capture.dropped[index].count};
-    write_struct(drop, "drop", filled, sizeof(maq_capture_drop));
+    write_struct(drop, "drop", filled);
     return MAQ_OK;
   });
 }
@@ -86,7 +86,7 @@ maq_status maq_capture_load_depth(const maq_capture* capture, uint32_t index, ma
     PinholeCamera of_depth;
     load_depth(capture->capture.views[index], made->frame, of_depth);
     made->frame.sequence = index;
-    write_struct(camera, "camera", camera_of(of_depth), sizeof(maq_pinhole_camera));
+    write_struct(camera, "camera", camera_of(of_depth));
     *frame = made.release();
     return MAQ_OK;
   });

@@ -63,7 +63,7 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
     std::copy_n(bounds.low.begin(), 3, filled.bounds_min);
     std::copy_n(bounds.high.begin(), 3, filled.bounds_max);
     std::copy(from.networks_sha256.begin(), from.networks_sha256.end(), filled.networks_sha256);
-    write_struct(info, "info", filled, sizeof filled);
+    write_struct(info, "info", filled);
     return MAQ_OK;
   });
 }

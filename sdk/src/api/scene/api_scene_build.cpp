@@ -104,7 +104,7 @@ struct maq_scene_builder : HandleOf<HandleKind::kSceneBuilder> {
 };
 
 maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_scene_build_config(), sizeof(maq_scene_build_config));
+  return init_config(__func__, config, struct_size, default_scene_build_config());
 }
 
 maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* given, const maq_capture* capture,
@@ -113,15 +113,14 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
     require_argument(context, "context");
     require_argument(capture, "capture");
     require_argument(scene, "scene");
-    const maq_scene_build_config config =
-        read_config(given, "config", default_scene_build_config(), sizeof(maq_scene_build_config));
+    const maq_scene_build_config config = read_config(given, "config", default_scene_build_config());
     const BuildSettings settings = checked_settings(config);
-    if (stats != nullptr) require_struct_size("stats", stats->struct_size, sizeof *stats, sizeof *stats);
+    if (stats != nullptr) require_struct_size("stats", stats->struct_size, sizeof *stats);
     const auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
     std::optional<BuiltScene> built = build_scene(capture->capture, networks, settings.options, settings.progress);
     if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback ended the building.");
     auto made = std::make_unique<maq_scene>(std::move(built->scene));
-    if (stats != nullptr) write_struct(stats, "stats", stats_of(built->stats), sizeof *stats);
+    if (stats != nullptr) write_struct(stats, "stats", stats_of(built->stats));
     *scene = made.release();
     return MAQ_OK;
   });
@@ -133,14 +132,13 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     require_argument(context, "context");
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
-    require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud), sizeof(maq_point_cloud));
+    require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud));
     if (cloud->point_count > 0) require_argument(cloud->xyz, "cloud.xyz");
     if (cloud->point_count > kMaxPoints) {
       throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->point_count, " points, over the limit of ",
                   kMaxPoints, "; make it thinner.");
     }
-    const maq_scene_build_config config =
-        read_config(given, "config", default_scene_build_config(), sizeof(maq_scene_build_config));
+    const maq_scene_build_config config = read_config(given, "config", default_scene_build_config());
     BuildSettings settings = checked_settings(config);
     auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
     PointCloud points;
@@ -164,7 +162,7 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
   return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(photo, "photo");
     require_argument(camera, "camera");
-    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera), sizeof(maq_pinhole_camera));
+    require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera));
     check_camera(pinhole_of(*camera), "The photo's camera");
     check_distortion(camera->intrinsics);
     const std::optional<size_t> seen = builder->builder.add_view(photo->frame.image, lens_of(camera->intrinsics),
@@ -185,7 +183,7 @@ maq_status maq_scene_builder_cancel(maq_scene_builder* builder) {
 
 maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_scene_build_stats* stats) {
   return guarded_alone(builder, "builder", __func__, [&] {
-    write_struct(stats, "stats", stats_of(builder->builder.stats()), sizeof *stats);
+    write_struct(stats, "stats", stats_of(builder->builder.stats()));
     return MAQ_OK;
   });
 }

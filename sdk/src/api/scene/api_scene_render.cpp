@@ -30,7 +30,7 @@ struct maq_scene_renderer : HandleOf<HandleKind::kSceneRenderer> {
 };
 
 maq_status maq_scene_renderer_config_init(maq_scene_renderer_config* config, uint32_t struct_size) {
-  return init_config(__func__, config, struct_size, default_scene_renderer_config(), sizeof(maq_scene_renderer_config));
+  return init_config(__func__, config, struct_size, default_scene_renderer_config());
 }
 
 maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_renderer_config* given,
@@ -39,8 +39,7 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     require_argument(context, "context");
     require_argument(scene, "scene");
     require_argument(renderer, "renderer");
-    const maq_scene_renderer_config config =
-        read_config(given, "config", default_scene_renderer_config(), sizeof(maq_scene_renderer_config));
+    const maq_scene_renderer_config config = read_config(given, "config", default_scene_renderer_config());
     require_range("config.image_pool_size", config.image_pool_size, 1u, 64u);
     require_range("config.allow_spinning", config.allow_spinning, 0, 1);
     require_range("config.near_depth", config.near_depth, 0.0, std::numeric_limits<double>::max());
@@ -131,7 +130,7 @@ maq_status maq_scene_image_get_stats(const maq_scene_image* image, maq_scene_ima
     filled.shaded_point_count = from.shaded_points;
     filled.refined_pixel_count = int64_t(from.refined_pixels);
     filled.provider = from.provider;
-    write_struct(stats, "stats", filled, offsetof(maq_scene_image_stats, provider));
+    write_struct(stats, "stats", filled);
     return MAQ_OK;
   });
 }

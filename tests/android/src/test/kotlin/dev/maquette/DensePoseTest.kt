@@ -205,6 +205,6 @@ class DensePoseTest : AndroidTest() {
         assertEquals(0, DensePose.partColour(0))
         assertTrue((1..24).all { Color.alpha(DensePose.partColour(it)) == 255 })
         assertFalse(DensePose.partColour(1) == DensePose.partColour(2))
-        assertEquals("0.2.0", Maquette.version)
+        assertEquals("0.3.0", Maquette.version)
     }
 }

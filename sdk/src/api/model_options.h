@@ -1,0 +1,27 @@
+// The model options of a config: checked, and as the engine takes them.
+#pragma once
+
+#include <string>
+
+#include "api/boundary.h"
+
+namespace maq {
+
+enum class ThreadMeasuring { kSupported, kUnsupported };
+
+// Throws ArgumentError for values outside their range. `name` is the config's name and member: "config.model".
+inline void require_model_options(const std::string& name, const maq_model_options& options,
+                                  ThreadMeasuring measuring = ThreadMeasuring::kSupported) {
+  if (measuring == ThreadMeasuring::kSupported) {
+    require_threads(name + ".threads", options.threads, 64);
+  } else {
+    require_range(name + ".threads", options.threads, 0, 64);
+  }
+  require_range(name + ".spinning", number_in(options.spinning), int32_t(MAQ_SPINNING_DEFAULT),
+                int32_t(MAQ_SPINNING_OFF));
+  require_provider(name + ".provider", options.provider);
+}
+
+inline bool may_spin(const maq_model_options& options) { return options.spinning != MAQ_SPINNING_OFF; }
+
+}  // namespace maq

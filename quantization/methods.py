@@ -1,7 +1,7 @@
 """Which ranges and which corrections suit which graph: signal to noise of its outputs for each.
 
 Everything is calibrated on the same few training images and measured on held-out ones; what stays float is as in the
-settings. Writes the rows into docs/quantization.json; `python -m quantization.report` puts them into the page.
+settings. Writes the rows into docs/research/quantization.json; `python -m quantization.report` puts them into the page.
 """
 
 from __future__ import annotations

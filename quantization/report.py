@@ -1,6 +1,6 @@
 """The error of an int8 bundle, tensor by tensor.
 
-Prints the worst; writes all to docs/quantization.json, tables to docs/quantization.md, a picture to docs/pictures.
+Prints the worst; writes all to docs/research/quantization.json, tables to docs/research/quantization.md, a picture to docs/images.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from quantization.report_files import write_markdown, write_picture
 from quantization.samples import Sample, collect, spread
 
 SCHEMA = "maquette-quantization-1"
-JSON = Path("docs/quantization.json")
-MARKDOWN = Path("docs/quantization.md")
-PICTURE = Path("docs/pictures/quantization.png")
+JSON = Path("docs/research/quantization.json")
+MARKDOWN = Path("docs/research/quantization.md")
+PICTURE = Path("docs/images/quantization.png")
 SHOWN = 15
 SATURATION_SAMPLES = 2
 

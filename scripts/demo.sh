@@ -95,5 +95,5 @@ fi
 
 printf '\nPictures to look at, in %s:\n' "$out"
 find "$out" -name '*_overlay.*' -o -name '*.mp4' | sort | sed 's/^/  /'
-printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/formats.md); <place>.maqs, scenes;\n'
+printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/reference/formats.md); <place>.maqs, scenes;\n'
 printf 'box_depth_distance.png and box_depth_kind.png, the field of edges; box_depth_curves.step, .dxf and .json, its curves; head.glb.\n'

@@ -73,7 +73,7 @@ def sheet(pictures: list[np.ndarray], columns: int, width_px: int) -> np.ndarray
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs/pictures")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs/images")
     options = parser.parse_args()
     if not DEMO.exists():
         parser.error(f"{DEMO} is not there; build it: make packages-test build")

@@ -57,8 +57,8 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--bundle", type=Path, default=Path("sdk/models/densepose-b-int8"), metavar="DIR")
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")
-    parser.add_argument("--gallery", type=Path, default=Path("docs/pictures/failures.jpg"), metavar="JPG")
-    parser.add_argument("--docs", type=Path, default=Path("docs/model-card.md"), metavar="MD")
+    parser.add_argument("--gallery", type=Path, default=Path("docs/images/failures.jpg"), metavar="JPG")
+    parser.add_argument("--docs", type=Path, default=Path("docs/reference/model-card.md"), metavar="MD")
     arguments = parser.parse_args(argv)
     try:
         if not arguments.gallery.exists():

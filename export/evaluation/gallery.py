@@ -49,7 +49,7 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")
     parser.add_argument("--backend", default="capi", help="one that was measured (default: capi)")
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures/failures.jpg"), metavar="JPG")
+    parser.add_argument("--out", type=Path, default=Path("docs/images/failures.jpg"), metavar="JPG")
     parser.add_argument("--cases", type=int, default=3, metavar="N", help="rendered cases of each kind (default 3)")
     parser.add_argument(
         "--all-photos", action="store_true", help="also photographs that may not be redistributed: do not commit"

@@ -1,8 +1,8 @@
-"""How figures grew with training: one entry for each set of weights, kept in docs/progress.json and drawn.
+"""How figures grew with training: one entry for each set of weights, kept in docs/research/progress.json and drawn.
 
     python -m export.evaluation --backends torch=WEIGHTS
     python -m export.evaluation.progress --add photographs --hours 6.9 --images 420000
-    python -m export.evaluation.progress            # draws docs/pictures/progress.png again
+    python -m export.evaluation.progress            # draws docs/images/progress.png again
 """  # fmt: skip
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PHOTOS = {
 
 
 def entry(name: str, hours: float, images: int, document: dict) -> dict:
-    """One row of docs/progress.json from an evaluation.json with one column. Raises ValueError for more columns."""
+    """One row of docs/research/progress.json from an evaluation.json with one column. Raises ValueError for more columns."""
     if len(document["results"]) != 1:
         raise ValueError(f"the evaluation has {len(document['results'])} columns; run it with one backend")
     (column,) = document["results"].values()
@@ -89,8 +89,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--hours", type=float, help="of training so far, runs that these weights descend from included")
     parser.add_argument("--images", type=int, help="seen so far, likewise")
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")
-    parser.add_argument("--progress", type=Path, default=Path("docs/progress.json"), metavar="JSON")
-    parser.add_argument("--picture", type=Path, default=Path("docs/pictures/progress.png"), metavar="PNG")
+    parser.add_argument("--progress", type=Path, default=Path("docs/research/progress.json"), metavar="JSON")
+    parser.add_argument("--picture", type=Path, default=Path("docs/images/progress.png"), metavar="PNG")
     arguments = parser.parse_args(argv)
     if arguments.add and (arguments.hours is None or arguments.images is None):
         parser.error("--add needs --hours and --images")

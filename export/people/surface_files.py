@@ -122,7 +122,7 @@ def picture(atlas: Atlas) -> np.ndarray:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--grid", type=Path, default=Path("export/densepose/surface.grid"))
-    parser.add_argument("--picture", type=Path, default=Path("docs/pictures/atlas.png"))
+    parser.add_argument("--picture", type=Path, default=Path("docs/images/atlas.png"))
     options = parser.parse_args()
     atlas = Atlas(Body())
     surface_grid(atlas).save(options.grid)

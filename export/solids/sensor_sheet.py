@@ -1,6 +1,6 @@
 """What the models of depth cameras make of one solid, and their noise against range beside published figures.
 
-    python -m export.solids.sensor_sheet --data .data/solids/val --out docs/pictures
+    python -m export.solids.sensor_sheet --data .data/solids/val --out docs/images
 
 `sensors.jpg`: a column a level; depth, normals of the depth as colours, and its error: grey none, red too near, blue
 too far, 4 r at full colour; black is unknown. `sensor-noise.png`: standard deviation of the depth of a wall that faces
@@ -105,7 +105,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/solids/val"), help="whole views")
     parser.add_argument("--view", type=int, default=38, help="which of those 320 px wide (default %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    parser.add_argument("--out", type=Path, default=Path("docs/images"))
     options = parser.parse_args()
     try:
         records = [r for r in read_records(options.data) if r.width == 320]

@@ -155,7 +155,7 @@ def test_the_command_writes_one_text_beside_the_manifest_and_into_the_docs(tmp_p
 
 def test_the_shipped_card_belongs_to_the_shipped_weights():
     """After new weights: python -m export.evaluation, .gallery, .card."""
-    for path in (BUNDLE / "MODEL_CARD.md", BUNDLE.parents[2] / "docs/model-card.md"):
+    for path in (BUNDLE / "MODEL_CARD.md", BUNDLE.parents[2] / "docs/reference/model-card.md"):
         assert f"`{fingerprint(BUNDLE)}`" in path.read_text()
 
 

@@ -86,7 +86,7 @@ WORDS = [
 ]
 
 # Texts of others, and figures as a run wrote them.
-SKIPPED = ("sdk/licenses/", "desktop_demo/licenses/", "docs/benchmarks/", "docs/progress.json", "docs/ablation.json")
+SKIPPED = ("sdk/licenses/", "desktop_demo/licenses/", "docs/benchmarks/", "docs/research/progress.json", "docs/research/ablation.json")
 # Where a pattern finds what means something else: (file, line) as regular expressions, each with its reason.
 EXCEPTIONS = [
     (r"quantization", r"\bshare_scales\b"),  # shares: is in common

@@ -62,7 +62,7 @@ class LiveOverlayTest : AndroidTest() {
         val body = "open class LiveOverlay" + source.substringAfter("open class LiveOverlay").trimEnd()
         assertTrue("${body.lines().size} lines", body.lines().size <= 20)
         val lines = body.lines().joinToString("\n") { if (it.isEmpty()) it else "    $it" }
-        val shown = File(root, "docs/android.md").readText()
-        assertTrue("docs/android.md shows another activity", shown.contains(lines))
+        val shown = File(root, "docs/guide/android.md").readText()
+        assertTrue("docs/guide/android.md shows another activity", shown.contains(lines))
     }
 }

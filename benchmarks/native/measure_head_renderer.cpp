@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "head/build/head_surface.h"
+#include "head/reconstruction/head_surface.h"
 #include "head/files/head_file.h"
 #include "head/render/head_renderer.h"
 #include "support/samples/ball_mesh.h"

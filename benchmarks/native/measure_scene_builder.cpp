@@ -9,7 +9,7 @@
 #include <random>
 
 #include "core/error.h"
-#include "scene/build/descriptor_fitter.h"
+#include "scene/assembly/descriptor_fitter.h"
 #include "support/peak_memory.h"
 
 namespace {

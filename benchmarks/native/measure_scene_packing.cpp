@@ -11,7 +11,7 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "scene/build/descriptor_fitter.h"
+#include "scene/assembly/descriptor_fitter.h"
 #include "scene/capture/posed_view.h"
 #include "scene/format/block_codec.h"
 #include "scene/format/scene.h"

@@ -1,5 +1,5 @@
-// The template head as a mesh with texture coordinates and facial actions. Plain data; files/ reads it, wrap/ lays it
-// onto a head.
+// The template head as a mesh with texture coordinates and facial actions. Plain data; files/ reads it and registration/
+// registers it to a head.
 #pragma once
 
 #include <cstddef>

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "head/build/head_builder.h"
-#include "head/build/head_surface.h"
+#include "head/reconstruction/head_builder.h"
+#include "head/reconstruction/head_surface.h"
 #include "support/samples/tiny_head.h"
 
 namespace shipped_heads {

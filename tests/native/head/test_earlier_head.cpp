@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "head/build/earlier_head.h"
-#include "head/build/known_anchors.h"
+#include "head/reconstruction/earlier_head.h"
+#include "head/reconstruction/known_anchors.h"
 #include "head/fit/anchor_fit.h"
 #include "head/synthetic_head.h"
 #include "support/expect_error.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "head/build/known_anchors.h"
+#include "head/reconstruction/known_anchors.h"
 #include "head/fit/anchor_fit.h"
 #include "head/synthetic_head.h"
 

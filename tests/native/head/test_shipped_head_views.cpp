@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "head/build/wrapped_surface.h"
+#include "head/reconstruction/registered_template.h"
 #include "head/render/head_renderer.h"
 #include "head/shipped_heads.h"
 
@@ -75,7 +75,7 @@ TEST_F(ShippedHeadViews, FromEverySideThereIsAHeadThatStaysAHeadOrAStatus) {
 TEST_F(ShippedHeadViews, AnOpenMouthAndClosedEyesAreTheSamePerson) {
   const Made as_it_is = make(photo_);
   HeadMesh mesh =
-      wrapped_surface(as_it_is.head, *template_of_bundle(maq::read_bundle(MAQ_TEST_MODELS "/heads-int8")), threads_);
+      registered_template(as_it_is.head, *template_of_bundle(maq::read_bundle(MAQ_TEST_MODELS "/heads-int8")), threads_);
   const View still = view_of(mesh, 10, 0);
   for (const MorphTarget& target : mesh.morph_targets) {
     if (target.name != "jawOpen" && target.name.rfind("eyeBlink", 0) != 0) continue;

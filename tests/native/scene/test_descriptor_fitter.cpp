@@ -5,7 +5,7 @@
 #include <limits>
 #include <thread>
 
-#include "scene/build/descriptor_fitter.h"
+#include "scene/assembly/descriptor_fitter.h"
 #include "support/expect_error.h"
 #include "support/peak_memory.h"
 #include "support/samples/tiny_scene.h"

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "scene/build/descriptor_regression.h"
+#include "scene/assembly/descriptor_regression.h"
 
 namespace {
 

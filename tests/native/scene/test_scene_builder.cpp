@@ -1,5 +1,5 @@
 // Captures to scenes: which photos are used, how large, and what is reported.
-#include "scene/build/build_scene.h"
+#include "scene/assembly/build_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -19,14 +19,14 @@ BACKEND = BASE - {"nn"} | {"sources"}
 CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
-SCENE = SEEN | {"scene/build", "scene/render"}
+SCENE = SEEN | {"scene/assembly", "scene/render"}
 CURVES = {"edges", "edges/curves"}
-HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/wrap"}
+HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/registration"}
 SYSTEMS = (
     SCENE
     | CURVES
     | HEAD
-    | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/build", "head/bundle", "head/files",
+    | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/reconstruction", "head/bundle", "head/files",
        "head/render", "prediction", "prediction/codes", "prediction/networks", "prediction/surprise",
        "prediction/transformer", "sources", "sources/recording"}
 )  # fmt: skip
@@ -48,7 +48,7 @@ MAY_INCLUDE = {
     "edges/measuring": BASE - {"nn"} | CURVES,
     "head": {"core", "core/math", "head/camera", "head/field"},
     "head/bundle": BASE | {"head", "head/field", "head/files", "head/fit"},
-    "head/build": BASE | {"head/bundle"} | HEAD,
+    "head/reconstruction": BASE | {"head/bundle"} | HEAD,
     "head/camera": {"core", "core/math"},
     "head/field": {"core", "core/math"},
     "head/files": {"core", "core/files", "core/math", "head", "head/camera", "head/field"},
@@ -56,7 +56,7 @@ MAY_INCLUDE = {
     "head/mesh": BASE - {"nn"} | {"head/camera"},
     "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
-    "head/wrap": {"core", "core/math", "head"},
+    "head/registration": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
     "prediction/codes": BASE,
     "prediction/networks": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
@@ -67,7 +67,7 @@ MAY_INCLUDE = {
     "scene/networks": CAPTURE,
     "scene/format": CAPTURE | {"scene/networks"},
     "scene/visibility": FITTED - {"scene/capture"},
-    "scene/build": SEEN,
+    "scene/assembly": SEEN,
     "scene/render": SEEN - {"scene/capture"},
     "sources": BACKEND | {"sources/android", "sources/v4l2", "sources/libcamera", "sources/depthai",
                           "sources/recording", "sources/files", "sources/synthetic"},

@@ -5,10 +5,10 @@
 #include "api/frame_handle.h"
 #include "api/head/head_handle.h"
 #include "core/worker_threads.h"
-#include "head/build/head_scale.h"
-#include "head/build/head_surface.h"
-#include "head/build/head_texture.h"
-#include "head/build/wrapped_surface.h"
+#include "head/reconstruction/head_scale.h"
+#include "head/reconstruction/head_surface.h"
+#include "head/reconstruction/head_texture.h"
+#include "head/reconstruction/registered_template.h"
 #include "head/bundle/head_bundle.h"
 #include "head/files/head_file.h"
 #include "head/mesh/mesh_files.h"
@@ -95,7 +95,7 @@ const head::HeadMesh& mesh_of(maq_head& head, const maq_head_mesh_options* given
   head::SurfaceStats stats;
   head::HeadMesh mesh;
   if (topology == MAQ_HEAD_TOPOLOGY_TEMPLATE) {
-    mesh = head::wrapped_surface(head.head, template_of(head, options), threads);
+    mesh = head::registered_template(head.head, template_of(head, options), threads);
   } else {
     mesh = head::head_surface(head.head, wanted, threads, &stats);
     if (head.head.texture.side_px > 0) head::set_texture_coordinates(head.head, mesh);

@@ -6,7 +6,7 @@
 #include "api/frame_handle.h"
 #include "api/head/head_handle.h"
 #include "core/worker_threads.h"
-#include "head/build/head_builder.h"
+#include "head/reconstruction/head_builder.h"
 #include "nn/provider.h"
 
 using namespace maq;

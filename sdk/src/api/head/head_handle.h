@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "api/handle.h"
-#include "head/build/head_surface.h"
+#include "head/reconstruction/head_surface.h"
 #include "head/head_template.h"
 #include "head/mesh/head_mesh.h"
 #include "head/stored_head.h"

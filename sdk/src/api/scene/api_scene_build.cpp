@@ -8,7 +8,7 @@
 #include "api/boundary.h"
 #include "api/frame_handle.h"
 #include "api/scene/scene_conversions.h"
-#include "scene/build/build_scene.h"
+#include "scene/assembly/build_scene.h"
 
 using namespace maq;
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "head/build/head_surface.h"
+#include "head/reconstruction/head_surface.h"
 #include "support/expect_error.h"
 #include "support/samples/closed_mesh.h"
 

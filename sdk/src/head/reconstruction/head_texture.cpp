@@ -1,0 +1,89 @@
+#include "head/reconstruction/head_texture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "head/reconstruction/head_surface.h"
+#include "head/mesh/mesh_cleanup.h"
+#include "head/texture/texture_layout.h"
+#include "image/files/image_file.h"
+#include "image/files/jpeg.h"
+
+namespace maq::head {
+namespace {
+
+constexpr double kBakedCell_m = 0.002;
+constexpr float kCapTolerance_dm = 0.003f;
+constexpr int kTextureQuality = 92;
+constexpr float kBeyondPhoto = 127;
+
+}  // namespace
+
+TextureCrop texture_crop(const ImageView& photo, const HeadSquare& square, int texture_px) {
+  TextureCrop made;
+  made.side_px = std::clamp(int(std::ceil(square.side_px)), 2, texture_px);
+  const AffineMap to_photo = crop_to_photo(square, made.side_px);
+  made.photo_to_crop = to_photo.inverse();
+  NetworkInputSpec as_bytes;
+  as_bytes.mean = {kBeyondPhoto, kBeyondPhoto, kBeyondPhoto};
+  as_bytes.std = {1, 1, 1};
+  CropInput crop;
+  make_crop_input(photo, to_photo, {made.side_px, made.side_px}, as_bytes, crop);
+  const size_t pixels = size_t(made.side_px) * size_t(made.side_px);
+  made.rgb.resize(3 * pixels);
+  for (size_t i = 0; i < pixels; ++i) {
+    for (size_t c = 0; c < 3; ++c) {
+      made.rgb[3 * i + c] = uint8_t(std::clamp(crop.values[c * pixels + i] + kBeyondPhoto + 0.5f, 0.0f, 255.0f));
+    }
+  }
+  return made;
+}
+
+void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh) {
+  const double scale = 10 * head.scale.metres_per_unit;  // the mesh is in true decimetres
+  const Vec3 normal = normalized(head.cut.normal);
+  const auto is_cap = find_cap(mesh, {float(normal.x), float(normal.y), float(normal.z)},
+                               float(scale * dot(normal, head.cut.point)), kCapTolerance_dm);
+  set_texture_coordinates(mesh, is_cap);
+}
+
+StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
+                           const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier) {
+  HeadMesh mesh = head_surface(head, {kBakedCell_m}, threads);
+  set_texture_coordinates(head, mesh);
+  const double scale = 10 * head.scale.metres_per_unit;
+  std::vector<TexturePhoto> given;
+  for (const TextureSource& source : photos) {
+    TexturePhoto photo;
+    photo.camera = crop_camera(source.camera, source.crop->photo_to_crop, source.crop->side_px);
+    photo.camera.head_to_camera.translation = scale * photo.camera.head_to_camera.translation;
+    photo.rgb = source.crop->rgb;
+    photo.matte_side = source.seen->side;
+    for (const HeadCell& cell : source.seen->cells) photo.matte.push_back(float(cell.matte));
+    given.push_back(std::move(photo));
+  }
+  TextureImage before;
+  if (!earlier.jpeg.empty()) {
+    Frame decoded;
+    decode_image(earlier.jpeg, "The head's texture", decoded);
+    const ImageView& picture = decoded.image;
+    if (picture.format == MAQ_PIXEL_BGR8 && picture.width_px == picture.height_px) {
+      before.side_px = picture.width_px;
+      for (int row = 0; row < picture.height_px; ++row) {
+        const uint8_t* const from = picture.planes[0].data + size_t(row) * picture.planes[0].stride_bytes;
+        before.bgr.insert(before.bgr.end(), from, from + 3 * size_t(picture.width_px));
+      }
+    }
+  }
+  const TextureImage image = bake_texture(mesh, given, options, threads, before);
+  ImageView view;
+  view.format = MAQ_PIXEL_BGR8;
+  view.width_px = view.height_px = image.side_px;
+  view.planes[0] = {image.bgr.data(), size_t(image.side_px) * 3};
+  StoredTexture made;
+  made.side_px = image.side_px;
+  JpegEncoder().encode(view, kTextureQuality, made.jpeg);
+  return made;
+}
+
+}  // namespace maq::head

@@ -1,0 +1,18 @@
+// The surface of a fitted head as the template's mesh: its vertices, triangles and texture coordinates, with facial
+// actions as morph targets.
+#pragma once
+
+#include "core/worker_threads.h"
+#include "head/head_template.h"
+#include "head/mesh/head_mesh.h"
+#include "head/registration/template_registration.h"
+#include "head/stored_head.h"
+
+namespace maq::head {
+
+// As head_surface() has it: true decimetres, colours, template points; normals are those of the mesh. It is open at the
+// neck. `registration`: what register_template() says of itself. The same for any number of threads.
+HeadMesh registered_template(const StoredHead& head, const HeadTemplate& onto, WorkerThreads& threads,
+                             TemplateRegistration* registration = nullptr);
+
+}  // namespace maq::head

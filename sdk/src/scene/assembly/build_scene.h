@@ -1,0 +1,79 @@
+// From posed photos and a point cloud to a scene: loading, fitting, packing, and what all that took.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/assembly/descriptor_fitter.h"
+#include "scene/capture/capture.h"
+#include "scene/capture/posed_view.h"
+#include "scene/format/scene_packing.h"
+
+namespace maq {
+
+struct SceneBuildOptions {
+  FittingOptions fitting;
+  ScenePacking packing;
+  uint64_t max_points = 0;  // of larger clouds points are taken evenly; 0: all
+  // Larger photos are shrunk; 0: none, and those over the networks' limit (SceneNetworks::kMaxPixels) are left out.
+  int long_side_px = 640;
+  // Of captures:
+  size_t max_views = 0;        // evenly from all that may be used; 0: all
+  bool uses_held_out = false;  // photos that the capture keeps for comparisons
+};
+
+struct SceneBuildStats {
+  size_t views = 0, unused_views = 0;  // photos that saw points; that saw none or could not be used
+  uint64_t cloud_points = 0;           // after max_points
+  uint64_t seen_points = 0;
+  double load_ms = 0, pack_ms = 0;
+  FittingTimes fitting;
+};
+
+// Photo by photo.
+class SceneBuilder {
+ public:
+  // Throws as DescriptorFitter does, and MAQ_ERROR_INVALID_ARGUMENT for a negative long_side_px.
+  SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, std::shared_ptr<SceneNetworks> networks,
+               const SceneBuildOptions& options);
+
+  // Both return how many points the photo sees, and nothing where they were cancelled; they throw what
+  // PosedView::load() and DescriptorFitter::add_view() throw, and then change nothing.
+  std::optional<size_t> add_view(const CaptureView& view, const BuildProgress& progress = {});
+  std::optional<size_t> add_view(const ImageView& image, const Lens& lens, const PinholeCamera& pose,
+                                 const BuildProgress& progress = {});
+
+  // As DescriptorFitter has them: more photos can be added after finish(), and none were after finish_and_forget(),
+  // which takes less memory.
+  Scene finish() { return packed(fitter_.finish()); }
+  Scene finish_and_forget();
+  void cancel() { fitter_.cancel(); }
+
+  SceneBuildStats stats() const;
+
+ private:
+  std::optional<size_t> add_loaded(const BuildProgress& progress);
+  Scene packed(const FittedPoints& points);
+
+  std::shared_ptr<SceneNetworks> networks_;
+  SceneBuildOptions options_;
+  SceneBuildStats stats_;  // without what the fitter counts
+  DescriptorFitter fitter_;
+  PosedView photo_;
+};
+
+struct BuiltScene {
+  Scene scene;
+  SceneBuildStats stats;
+  std::vector<Dropped> dropped;  // photos that could not be used, or see nothing
+};
+
+// Of all photos of a capture, one after the other. Returns nothing where `progress` cancelled. Throws
+// MAQ_ERROR_INVALID_ARGUMENT also where all photos are held out; MAQ_ERROR_UNREADABLE where none can be used or sees a
+// point; and what SceneBuilder throws.
+std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,
+                                      const SceneBuildOptions& options, const BuildProgress& progress = {});
+
+}  // namespace maq

@@ -45,8 +45,8 @@ int main(int argc, char** argv) try {
   if (argc != 5) throw std::runtime_error("arguments: DENSEPOSE_BUNDLE URI BUDGET_MS LABELS");
   const maquette::Context context;
   maq_densepose_config model = maquette::default_densepose_config();
-  model.bundle_path = argv[1];
-  model.threads = 1;
+  model.model.bundle_path = argv[1];
+  model.model.threads = 1;
   Run run;
   run.labels.open(argv[4], std::ios::binary);
   maq_pipeline_config config = maquette::default_pipeline_config();

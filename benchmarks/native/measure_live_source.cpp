@@ -86,8 +86,8 @@ int main(int argc, char** argv) try {
   if (argc != 4) throw std::runtime_error("arguments: DENSEPOSE_BUNDLE URI SECONDS");
   const maquette::Context context;
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = argv[1];
-  config.allow_spinning = 0;  // as the demo
+  config.model.bundle_path = argv[1];
+  config.model.spinning = MAQ_SPINNING_OFF;  // as the demo
   Events events;
   maquette::LiveDensePose* told = nullptr;  // the pipeline starts when it is opened
   maquette::LiveDensePose live(

@@ -18,7 +18,7 @@ constexpr int kTurnsAlone = 20;  // images one way, then as many back
 HeadView::HeadView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
     : MainView(options, window, painter),
       seconds_(float(options.fit_seconds)),
-      live_(context, options.heads_bundle, options.model.threads, Window::wake) {
+      live_(context, options.heads_bundle, options.model.model.threads, Window::wake) {
   wanted_.yaw_rad = kFirstYaw_rad, wanted_.pitch_rad = kFirstPitch_rad;
   wanted_.shading = options.shading;
   wanted_.is_over_photo = options.compare == Compare::kSlider;

@@ -32,7 +32,8 @@ int main(int argc, char** argv) try {
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
   // A thread that stays awake takes a core from the window.
-  options.model.allow_spinning = options.edges_model.edges.allow_spinning = 0;
+  options.model.model.spinning = MAQ_SPINNING_OFF;
+  options.edges_model.edges.allow_spinning = 0;
   bool part_only = false, skip_planes = false;
   double ahead_ms = options.prediction.ahead_s * 1e3;
   std::string method = kMethodNames[0];
@@ -113,7 +114,7 @@ int main(int argc, char** argv) try {
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
   cli.add_option("--edges-bundle", options.edges_bundle, "Folder of the edge network");
   cli.add_option("--heads-bundle", options.heads_bundle, "Folder of the heads' network");
-  cli.add_option("--threads", options.model.threads, "Of the networks; 0: the large cores, at most 4")
+  cli.add_option("--threads", options.model.model.threads, "Of the networks; 0: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
   cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
       ->check(CLI::Range(1, 1000));
@@ -150,9 +151,9 @@ int main(int argc, char** argv) try {
       std::max(options.width_px, options.height_px) > 16384) {
     throw std::runtime_error("--size " + size + " is no size of a window: write it as 1280x800, each 64 to 16384.");
   }
-  options.model.bundle_path = options.bundle.c_str();
+  options.model.model.bundle_path = options.bundle.c_str();
   options.edges_model.edges.bundle_path = options.edges_bundle.c_str();
-  options.edges_model.edges.threads = options.model.threads;
+  options.edges_model.edges.threads = options.model.model.threads;
   options.edges_model.edges.skip_planes = skip_planes ? 1 : 0;
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless) {

@@ -96,7 +96,7 @@ void PeopleView::draw_boxes() const {
   const auto on_screen = [&](float x, float y) {
     return ImVec2(float(image_rect_.x) + x * scale, float(image_rect_.y) + y * scale);
   };
-  for (const maq_person& person : frame().people) {
+  for (const maq_densepose_person& person : frame().people) {
     const ImVec2 from = on_screen(person.box_px[0], person.box_px[1]);
     const ImVec2 to = on_screen(person.box_px[2], person.box_px[3]);
     list->AddRect(from, to, IM_COL32(255, 255, 255, 255), 0, 0, 2 * window_.scale());
@@ -126,7 +126,7 @@ void PeopleView::add_to_report(nlohmann::ordered_json* report) const {
   if (mesh_rect_.width > 0) json["mesh_px"] = window_.in_pixels(mesh_rect_).numbers();
   json["frame_px"] = {frame().camera.width_px, frame().camera.height_px};
   json["people"] = nlohmann::json::array();
-  for (const maq_person& person : frame().people) {
+  for (const maq_densepose_person& person : frame().people) {
     json["people"].push_back({{"box", person.box_px}, {"score", person.score}});
   }
   json["scene"] = nullptr;
@@ -172,8 +172,8 @@ void PeopleView::draw_model_options() {
     ImGui::SliderInt(name, value, min, max, format, ImGuiSliderFlags_AlwaysClamp);
     changed |= ImGui::IsItemDeactivatedAfterEdit();
   };
-  slider("threads", &model_.threads, 0, cores, model_.threads == 0 ? "large cores" : "%d");
-  slider("key frames", &model_.key_frame_interval, 1, 30, model_.key_frame_interval == 1 ? "every" : "one in %d");
+  slider("threads", &model_.model.threads, 0, cores, model_.model.threads == 0 ? "large cores" : "%d");
+  slider("key frames", &model_.key_frame_interval, 0, 30, model_.key_frame_interval <= 1 ? "every" : "one in %d");
   slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "the model's" : "%d px");
   if (model_.long_side_px > 0) model_.long_side_px = std::max(64, model_.long_side_px);
   bool parts_alone = model_.detail == MAQ_DENSEPOSE_DETAIL_PART;
@@ -183,10 +183,14 @@ void PeopleView::draw_model_options() {
   }
   int crops = int(model_.person_crops);
   if (ImGui::Combo("crops of people", &crops, "off\0small or leaning\0all\0")) {
-    model_.person_crops = maq_person_crops(crops);
+    model_.person_crops = maq_densepose_crops(crops);
     changed = true;
   }
-  changed |= ImGui::CheckboxFlags("threads stay awake", &model_.allow_spinning, 1);
+  bool spins = model_.model.spinning != MAQ_SPINNING_OFF;
+  if (ImGui::Checkbox("threads stay awake", &spins)) {
+    model_.model.spinning = spins ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
+    changed = true;
+  }
   if (changed) live_.set_model(model_);
   if (ImGui::SliderAngle("camera's roll", &roll_rad_, -180, 180)) live_.set_roll(roll_rad_);
 }

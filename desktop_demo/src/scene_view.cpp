@@ -18,7 +18,7 @@ constexpr const char* kSceneStages[] = {"project", "shade", "refine", "resample"
 SceneView::SceneView(const maquette::Context& context, const Options& options, const Window& window, Painter& painter)
     : MainView(options, window, painter),
       compare_(options.compare),
-      live_(context, options.scene_bundle, options.model.threads, Window::wake) {
+      live_(context, options.scene_bundle, options.model.model.threads, Window::wake) {
   painter_.draw_scene({0, 0, 8, 8}, 0);  // software OpenGL compiles a shader when it draws with it first
 }
 

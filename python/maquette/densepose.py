@@ -70,7 +70,7 @@ class DensePose(NativeObject):
         result = n.create("maq_densepose_result", self.handle, frame.handle, function="maq_densepose_run",
                           release="maq_densepose_result_release")  # fmt: skip
         count = n.lib.maq_densepose_result_get_person_count(result)
-        found = n.indexed("maq_densepose_result_get_person", result, "maq_person", count)
+        found = n.indexed("maq_densepose_result_get_person", result, "maq_densepose_person", count)
         people = [Person(tuple(p.box_px), p.score, _head_box_px(result, index)) for index, p in enumerate(found)]
         planes = [
             n.plane("maq_densepose_result_get_plane", result, plane, frame.shape, np.uint8)

@@ -88,18 +88,22 @@ class Native:
         return self.ffi.gc(out[0], getattr(self.lib, release or f"{kind}_destroy"))
 
     def config(self, kind: str, settings: Mapping[str, Any]) -> Any:
-        """A struct of the C API with its defaults and the settings, by the names of its fields."""
+        """A struct of the C API with its defaults and the settings, by the names of its fields. The fields of its
+        maq_model_options, if it has them, are settings too: threads, bundle_path, ..."""
         struct = self.ffi.new(f"{kind} *")
         self.call(f"{kind}_init", struct, self.ffi.sizeof(kind))
-        known = {name for name, _ in self.ffi.typeof(kind).fields} - {"struct_size"}
+        fields = {name: struct for name, _ in self.ffi.typeof(kind).fields}
+        if fields.pop("model", None) is not None:
+            fields |= {name: struct.model for name, _ in self.ffi.typeof("maq_model_options").fields}
+        fields.pop("struct_size", None)
         kept = []
         for name, value in settings.items():
-            if name not in known:
-                raise TypeError(f"{kind} has no field {name}; it has {', '.join(sorted(known))}")
+            if name not in fields:
+                raise TypeError(f"{kind} has no field {name}; it has {', '.join(sorted(fields))}")
             if isinstance(value, (str, os.PathLike)):
                 value = self.ffi.new("char[]", os.fsencode(value))
                 kept.append(value)
-            setattr(struct, name, value)
+            setattr(fields[name], name, value)
         self._texts[struct] = kept
         return struct
 

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
                maq_densepose_run(densepose, frame, &result) != MAQ_OK;
   if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   for (i = 0; i < maq_densepose_result_get_person_count(result); ++i) {
-    maq_person person = {sizeof person};
+    maq_densepose_person person = {sizeof person};
     maq_densepose_result_get_person(result, i, &person);
     printf("person %.2f at x %.0f y %.0f\n", person.score, person.box_px[0], person.box_px[1]);
   }

@@ -11,56 +11,47 @@ extern "C" {
 typedef struct maq_densepose maq_densepose;
 typedef struct maq_densepose_result maq_densepose_result;
 
-/* What is computed for each pixel of a person. */
+/* The labels that each pixel of a person gets. */
 typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_SURFACE = 0, /* part, U and V */
   MAQ_DENSEPOSE_DETAIL_PART = 1     /* only the part: faster; U and V stay 0 */
 } maq_densepose_detail;
 
-/* Whose surface is computed a second time, from a crop of the frame in its full resolution, rotated upright by the axis
- * of the first surface. Finds more of the hands and of people who lean or are far away; each crop costs about as much
- * as the networks' run over a small frame. */
-typedef enum maq_person_crops {
-  MAQ_PERSON_CROPS_OFF = 0,
-  MAQ_PERSON_CROPS_AUTO = 1, /* of people who are small in the networks' input, or lean by more than 15 degrees */
-  MAQ_PERSON_CROPS_ALL = 2
-} maq_person_crops;
+/* The people whose surface is computed a second time, in a crop of the frame at full resolution. A crop is rotated
+ * upright by the body axis of the first surface. Crops find more of hands, and of people who lean or are far away. Each
+ * crop takes about as long as a small frame. */
+typedef enum maq_densepose_crops {
+  MAQ_DENSEPOSE_CROPS_OFF = 0,
+  MAQ_DENSEPOSE_CROPS_AUTO = 1, /* people who are small in the networks' input, or lean by more than 15 degrees */
+  MAQ_DENSEPOSE_CROPS_ALL = 2
+} maq_densepose_crops;
 
+/* Options. 0 is the default in every field; `model` has its own (types.h). */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  int32_t threads;         /* for the networks, 1 to 64; 0 (default): the machine's large cores, at most 4;
-                              MAQ_THREADS_MEASURED: as many of these as pay, measured */
-  const char* bundle_path; /* folder with manifest.json; NULL (default): bundle_files, or without them the bundle
-                                 installed with the library (share/maquette/models/densepose-b-int8). Copied. */
-  const maq_memory_file* bundle_files; /* the bundle's files in memory, instead of bundle_path; default NULL. Copied. */
-  uint32_t bundle_file_count;          /* default 0 */
-  int32_t long_side_px;                /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's */
-  float score_threshold;               /* minimum score of a person, 0 to 1; negative (default): the bundle's */
-  int32_t max_people;                  /* 1 to 255, best scores first; 0 (default): the bundle's */
-  uint32_t result_pool_size;           /* results the app may hold at once, 1 to 64; default 4 */
-  int32_t max_proposals;        /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's. Fewer are faster
-                                and may miss people in a crowd. */
-  int32_t key_frame_interval;   /* 1 (default): people are detected in every frame. N, up to 1000: in every N-th
-                                 frame of a stream; in between, boxes are propagated, no new people are found, and
-                                 frames without people cost nothing. A frame of another size is a key frame. Where
-                                 everybody has a crop (person_crops), only the crops are computed in between. */
-  int32_t min_person_height_px; /* people less tall than this in the frame may be missed; 0 (default): none */
-  maq_densepose_detail detail;  /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
-  int32_t allow_spinning; /* 1 (default): idle threads spin for a while; 0: they sleep, which saves energy and costs
-                                   some speed */
-  maq_person_crops person_crops; /* default MAQ_PERSON_CROPS_OFF */
-  int32_t person_crop_px;        /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
-  maq_provider provider; /* for the trunk and the heads; default MAQ_PROVIDER_CPU. Networks for which another cannot be
-                            had, or of which it takes less than half, run on the CPU: the log says why. Others are
-                            prepared anew for each size of the input. */
+  maq_model_options model;    /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */
+  int32_t long_side_px;       /* images are scaled to this long side, 32 to 2048; 0 (default): the bundle's value */
+  float score_threshold;      /* minimum score of a person, up to 1; 0 (default): the bundle's value */
+  int32_t max_people;         /* 1 to 255, best scores first; 0 (default): the bundle's value */
+  int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes
+                                 are faster and may miss people in a crowd. */
+  int32_t key_frame_interval; /* 0 (default) and 1: people are detected in every frame. N, up to 1000: in every N-th
+                                 frame of a stream. In between, boxes are propagated and no new people are found; frames
+                                 without people cost nothing. A frame of another size is a key frame. If everybody has
+                                 a crop (`person_crops`), only the crops are computed in between. */
+  int32_t min_person_height_px;     /* people less tall than this in the frame may be missed; 0 (default): no limit */
+  maq_densepose_detail detail;      /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
+  maq_densepose_crops person_crops; /* default MAQ_DENSEPOSE_CROPS_OFF */
+  int32_t person_crop_px;           /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
+  uint32_t result_pool_size;        /* results the app may hold at once, 1 to 64; 0 (default): 4 */
 } maq_densepose_config;
 
-typedef struct maq_person {
+typedef struct maq_densepose_person {
   uint32_t struct_size;
   float score;     /* 0 to 1 */
-  float box_px[4]; /* in pixels of the frame: left, top, right, bottom, the latter two exclusive */
-  int64_t id;      /* the same in each frame that shows the person; MAQ_NO_ID: people are not tracked yet */
-} maq_person;
+  float box_px[4]; /* in pixels of the frame: left, top, right, bottom; right and bottom are exclusive */
+  int64_t id;      /* the same in each frame that shows the person; MAQ_NO_ID in this version */
+} maq_densepose_person;
 
 /* The planes of a result: one byte a pixel of the frame. */
 typedef enum maq_densepose_plane {
@@ -70,19 +61,19 @@ typedef enum maq_densepose_plane {
   MAQ_DENSEPOSE_PLANE_PERSON = 4 /* index of the person in the result, plus 1; 0 for background */
 } maq_densepose_plane;
 
-/* Returns the name of a body part ("left upper arm, outside"): 0 is "background", other numbers than 0 to 24 are
- * "unknown part". The text is static. Any thread. Does not fail or block. */
+/* Returns the name of a body part ("left upper arm, outside"). Returns "background" for 0, and "unknown part" for
+ * numbers outside 0 to 24. The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_densepose_get_part_name(int32_t part);
 
-/* Writes the colour that the part is painted with in the SDK's pictures: red, green, blue; black for 0 and for other
- * numbers than 1 to 24. Any thread. Does not fail (NULL is fine) or block. */
+/* Writes the colour of a part in the SDK's images: red, green, blue. Writes black for numbers outside 1 to 24.
+ * Any thread. Does not fail (NULL is fine) or block. */
 MAQ_API void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]);
 
-/* Times of the stages of a run, in wall-clock milliseconds, and counts. */
+/* Times of the stages of a run, in milliseconds of wall-clock time, and counts. */
 typedef struct maq_densepose_stats {
   uint32_t struct_size;
   float preprocess_ms; /* resize and normalise */
-  float trunk_ms;      /* the trunk, that is backbone and FPN: features of the whole image */
+  float trunk_ms;      /* the trunk (backbone and FPN): features of the whole image */
   float proposals_ms;  /* region proposal network, top-k, NMS */
   float box_head_ms;   /* RoIAlign, box network, NMS */
   float dense_head_ms; /* RoIAlign, dense network */
@@ -93,48 +84,46 @@ typedef struct maq_densepose_stats {
   int32_t network_height_px;
   int32_t proposal_count;      /* boxes that reached the box head */
   int32_t person_count;        /* in the result */
-  int32_t crop_count;          /* crops of people that were computed (maq_person_crops) */
+  int32_t crop_count;          /* crops of people that were computed (maq_densepose_crops) */
   int32_t dropped_box_count;   /* boxes with NaN, or with no area inside the frame */
   int64_t body_pixel_count;    /* pixels that belong to a person */
-  int64_t clamped_pixel_count; /* of these, pixels where the network's U or V was outside 0 to 1 */
-  int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the frame before were propagated */
+  int64_t clamped_pixel_count; /* body pixels where the network's U or V was outside 0 to 1 */
+  int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the previous frame were propagated */
   maq_provider provider;       /* in use for the trunk */
-  int32_t threads;             /* of the networks; fewer where the system starts no more, as the log says then */
-  int32_t is_threads_measured; /* 1: that number was chosen by MAQ_THREADS_MEASURED */
+  int32_t threads;             /* in use for the networks; fewer where the system starts no more (see the log) */
+  int32_t is_threads_measured; /* 1: MAQ_THREADS_MEASURED chose that number */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size);
 
-/* Loads a model bundle: checks every file's size and SHA-256, and the networks' inputs and outputs, against its
- * manifest. `config` may be NULL for the defaults. `*densepose` is the caller's, to be given to maq_densepose_destroy.
+/* Loads a model bundle. Checks the size and SHA-256 of every file, and the inputs and outputs of the networks, against
+ * the manifest. `config` may be NULL for the defaults. Free `*densepose` with maq_densepose_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
- * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read and networks are prepared, and measured. */
+ * MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are read, and while networks are prepared and measured. */
 MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepose_config* config,
                                         maq_densepose** densepose);
 
-/* Frees the networks (NULL is fine). Results still held stay valid until they are released.
+/* Frees the networks (NULL is fine). Results that are still held stay valid until they are released.
  * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
 /* Finds the people in a frame and maps their pixels to the body surface. The frame is not kept. `*result` comes from a
- * pool of result_pool_size: give it back with maq_densepose_result_release. Without people, no head network runs and
- * the planes are zero.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks
- * while the networks run. */
+ * pool of result_pool_size: give it back with maq_densepose_result_release. If there are no people, no head network
+ * runs and the planes are zero. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY,
+ * MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks while the networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
-/* Cancels the maq_densepose_run that runs, or else the next: it returns MAQ_CANCELLED as soon as the layer of a network
- * that runs is done. Later ones run as usual, and the next frame is a key frame.
+/* Cancels the current maq_densepose_run, or the next one if none runs. The call returns MAQ_CANCELLED when the current
+ * layer of its network is done. Later runs work as usual; the next frame is a key frame.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_cancel(maq_densepose* densepose);
 
-/* Says how the camera is held: the next frames show the world rotated clockwise by `roll_rad`, -7 to 7, so that a
- * standing person's head is to the upper right of the feet for 0.5. 0 at first. The networks, which know people who
- * stand or lean a little, see the frames rotated upright, by steps of 15 degrees; results are in pixels of the frame as
- * ever. The input around a rotated frame is larger, and takes longer: twice as long halfway between upright and
- * sideways.
+/* Sets the roll of the camera for the next frames: the frames show the world rotated clockwise by `roll_rad`, -7 to 7;
+ * 0 at first. At 0.5, a standing person's head is to the upper right of the feet. The networks know upright people, so
+ * that frames are rotated upright for them, in steps of 15 degrees. Results stay in pixels of the frame. The input
+ * around a rotated frame is larger: halfway between upright and sideways it takes twice as long.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_set_roll(maq_densepose* densepose, float roll_rad);
 
@@ -154,20 +143,20 @@ MAQ_API maq_status maq_densepose_result_get_size(const maq_densepose_result* res
 /* Returns the number of people found; 0 for NULL. Any thread. Does not fail or block. */
 MAQ_API uint32_t maq_densepose_result_get_person_count(const maq_densepose_result* result);
 
-/* Gets the person at `index`, best score first. The caller sets person->struct_size. Each person has at
- * least one pixel: boxes without body pixels are dropped.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
+/* Gets the person at `index`, best score first. The caller sets person->struct_size. Each person has at least one
+ * pixel: boxes without body pixels are dropped. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range).
+ * Does not block. */
 MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
-                                                   maq_person* person);
+                                                   maq_densepose_person* person);
 
-/* Gets a box around the pixels of the person at `index` that show the head (parts 23 and 24), in pixels of the frame:
- * left, top, right, bottom, the latter two exclusive. For maq_head_photo.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (none of the head is seen).
+/* Gets the box of a person's head (the pixels of parts 23 and 24), for example for maq_head_photo. The box is in pixels
+ * of the frame: left, top, right, bottom; right and bottom are exclusive.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (no pixel shows the head).
  * Does not block. */
 MAQ_API maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result, uint32_t index,
                                                      float box_px[4]);
 
-/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. Where people overlap, the one with the
+/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. If people overlap, the person with the
  * better score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
@@ -177,14 +166,18 @@ MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* re
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
-/* How a result is drawn. */
+/* For maq_densepose_drawing.opacity: the colours are not drawn. */
+#define MAQ_DENSEPOSE_INVISIBLE (-1)
+
+/* Options of maq_densepose_result_draw. */
 typedef struct maq_densepose_drawing {
   uint32_t struct_size;
-  int32_t x_px; /* the part of the frame that is drawn; default: from its left upper corner */
+  int32_t x_px; /* left upper corner of the part that is drawn; 0 (default): the frame's corner */
   int32_t y_px;
-  int32_t width_px; /* 0 (default): up to the frame's right edge */
-  int32_t height_px;
-  int32_t opacity;     /* of the parts' colours: 0, invisible, to 255, which cover the frame; default 180 */
+  int32_t width_px;    /* 0 (default): up to the frame's right edge */
+  int32_t height_px;   /* 0 (default): down to the frame's lower edge */
+  int32_t opacity;     /* of the colours, 1 to 255 (they cover the frame); 0 (default): 180; or
+                            MAQ_DENSEPOSE_INVISIBLE */
   int32_t is_mirrored; /* 1: left and right change sides, as in a mirror; default 0 */
 } maq_densepose_drawing;
 
@@ -192,36 +185,36 @@ typedef struct maq_densepose_drawing {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size);
 
-/* Draws the people over their frame into memory of the app, as a preview or a window shows it: each of their pixels is
- * blended with the colour of its part (maq_densepose_get_part_colour). `frame` is the one that the result is of. NULL:
- * the colours alone, multiplied by their opacity, on transparent ground, to be drawn over a picture by others.
- * `rgba` gets height_px rows of `stride_bytes` (0: rows without padding), 4 bytes a pixel; `size_bytes` is the size of
- * the memory there. `drawing` may be NULL for the defaults.
+/* Draws the people over their frame into memory of the app, for a preview or a window. Each of their pixels is blended
+ * with the colour of its part (maq_densepose_get_part_colour). `frame` is the frame of the result. If it is NULL, the
+ * colours are drawn on transparent ground, multiplied by their opacity. `rgba` gets height_px rows of `stride_bytes`
+ * bytes (0: rows without padding), 4 bytes a pixel; it has `size_bytes` bytes. `drawing` may be NULL for the defaults.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory, a part that is not inside the frame, a frame of
  * another size), MAQ_ERROR_UNSUPPORTED (a depth image). Does not block. */
 MAQ_API maq_status maq_densepose_result_draw(const maq_densepose_result* result, const maq_frame* frame,
                                              const maq_densepose_drawing* drawing, uint8_t* rgba, size_t stride_bytes,
                                              size_t size_bytes);
 
-/* Writes three files into an existing folder ("": the current one), in the DensePose convention (docs/formats.md):
- * <stem>_IUV.png (channels I, U * 255, V * 255 in the file's order B, G, R), <stem>_INDS.png
- * (MAQ_DENSEPOSE_PLANE_PERSON) and <stem>.json (size, boxes, scores). Each is written atomically and replaces an
- * existing one, after all have been written. `stem` begins their names and names no folder.
+/* Writes three files in the DensePose convention (docs/formats.md):
+ *   <path>_IUV.png   channels I, U * 255, V * 255 in the file's order B, G, R
+ *   <path>_INDS.png  MAQ_DENSEPOSE_PLANE_PERSON
+ *   <path>.json      size, boxes, scores
+ * The folder of `path` exists. Files of these names are replaced, each atomically, after all have been written.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
  * (libmaquette_files.so is missing). Blocks while they are written. */
-MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem);
+MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* path);
 
-/* The points of the template body, in its rest pose, for each part, U and V: in metres, x to the body's left, y to its
+/* The points of the template body in its rest pose, for each part, U and V. In metres: x to the body's left, y to its
  * back, z up. */
 typedef struct maq_densepose_surface {
   uint32_t struct_size;
   int32_t nodes;         /* along U, and along V; at least 2 */
-  const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Between nodes,
-                            bilinear. x, y and z are NaN where the chart does not reach. */
+  const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Interpolate
+                            between nodes bilinearly. x, y and z are NaN outside the chart of the part. */
 } maq_densepose_surface;
 
-/* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size; the points are the
- * handle's and live as long as it does.
+/* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size. The points belong to
+ * `densepose` and live as long as it does.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE
  * (it is damaged). Blocks briefly the first time, while it is decoded. */
 MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface);

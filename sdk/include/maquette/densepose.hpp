@@ -31,15 +31,15 @@ class DensePoseResult {
 
   uint32_t person_count() const { return maq_densepose_result_get_person_count(get()); }
 
-  maq_person person(uint32_t index) const {
-    maq_person person{};
+  maq_densepose_person person(uint32_t index) const {
+    maq_densepose_person person{};
     person.struct_size = sizeof person;
     check(maq_densepose_result_get_person(get(), index, &person));
     return person;
   }
 
-  std::vector<maq_person> people() const {
-    std::vector<maq_person> people;
+  std::vector<maq_densepose_person> people() const {
+    std::vector<maq_densepose_person> people;
     for (uint32_t i = 0; i < person_count(); ++i) people.push_back(person(i));
     return people;
   }
@@ -74,9 +74,8 @@ class DensePoseResult {
                                     size_bytes));
   }
 
-  void save(const std::string& folder, const std::string& stem) const {
-    check(maq_densepose_result_save(get(), folder.c_str(), stem.c_str()));
-  }
+  // Writes <path>_IUV.png, <path>_INDS.png and <path>.json.
+  void save(const std::string& path) const { check(maq_densepose_result_save(get(), path.c_str())); }
 
  private:
   Owner<maq_densepose_result, maq_densepose_result_release> owner_;
@@ -91,7 +90,7 @@ class DensePose {
   explicit DensePose(const Context& context) { create(context, default_densepose_config()); }
   DensePose(const Context& context, const std::string& bundle_path) {
     maq_densepose_config config = default_densepose_config();
-    config.bundle_path = bundle_path.c_str();
+    config.model.bundle_path = bundle_path.c_str();
     create(context, config);
   }
 

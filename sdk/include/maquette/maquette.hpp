@@ -5,7 +5,7 @@
 //   maquette::DensePose densepose(context);
 //   while (auto frame = source.next()) {
 //     auto result = densepose.run(*frame);
-//     for (const maq_person& person : result.people()) …
+//     for (const maq_densepose_person& person : result.people()) …
 //   }
 //
 // Every class owns one handle, can be moved but not copied, and returns the handle by get(). Calls that fail throw

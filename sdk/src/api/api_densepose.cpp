@@ -4,6 +4,7 @@
 #include "api/bundle_argument.h"
 #include "api/densepose_handle.h"
 #include "api/frame_handle.h"
+#include "api/model_options.h"
 #include "core/worker_threads.h"
 #include "densepose/body_parts.h"
 #include "densepose/painting.h"
@@ -17,19 +18,11 @@ namespace {
 maq_densepose_config default_densepose_config() {
   maq_densepose_config config{};
   config.struct_size = sizeof config;
-  config.score_threshold = -1;
-  config.result_pool_size = 4;
-  config.key_frame_interval = 1;
-  config.detail = MAQ_DENSEPOSE_DETAIL_SURFACE;
-  config.allow_spinning = 1;
   return config;
 }
 
-maq_densepose_drawing default_drawing() {
-  maq_densepose_drawing drawing{};
-  drawing.opacity = 180;
-  return drawing;
-}
+constexpr int32_t kDefaultOpacity = 180;
+constexpr uint32_t kDefaultResultPoolSize = 4;
 
 // NULL for a number that is not a part's.
 const BodyPart* body_part(int32_t part) {
@@ -45,37 +38,35 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
 }
 
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
-  const auto field = [name](const char* of) { return concatenate(name, ".", of); };
-  require_threads(field("threads"), config.threads, kMaxThreads);
+  const auto field = [name](const char* member) { return concatenate(name, ".", member); };
+  require_model_options(field("model"), config.model);
   if (config.long_side_px != 0) require_range(field("long_side_px"), config.long_side_px, 32, 2048);
-  if (!(config.score_threshold < 0)) require_range(field("score_threshold"), config.score_threshold, 0.0f, 1.0f);
+  require_range(field("score_threshold"), config.score_threshold, 0.0f, 1.0f);
   if (config.max_people != 0) require_range(field("max_people"), config.max_people, 1, 255);
-  require_range(field("result_pool_size"), config.result_pool_size, 1u, 64u);
+  require_range(field("result_pool_size"), config.result_pool_size, 0u, 64u);
   if (config.max_proposals != 0) require_range(field("max_proposals"), config.max_proposals, 1, 1000);
-  require_range(field("key_frame_interval"), config.key_frame_interval, 1, 1000);
+  require_range(field("key_frame_interval"), config.key_frame_interval, 0, 1000);
   require_range(field("min_person_height_px"), config.min_person_height_px, 0, 100000);
   require_range(field("detail"), number_in(config.detail), int32_t(MAQ_DENSEPOSE_DETAIL_SURFACE),
                 int32_t(MAQ_DENSEPOSE_DETAIL_PART));
-  require_range(field("allow_spinning"), config.allow_spinning, 0, 1);
-  require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_PERSON_CROPS_OFF),
-                int32_t(MAQ_PERSON_CROPS_ALL));
+  require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_DENSEPOSE_CROPS_OFF),
+                int32_t(MAQ_DENSEPOSE_CROPS_ALL));
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
-  require_provider(field("provider"), config.provider);
   DensePoseSettings settings;
-  settings.threads = config.threads != 0 ? config.threads : default_threads();
+  settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
   settings.long_side_px = config.long_side_px;
-  settings.score_threshold = config.score_threshold;
+  settings.score_threshold = config.score_threshold > 0 ? config.score_threshold : -1;
   settings.max_people = config.max_people;
   settings.max_proposals = config.max_proposals;
-  settings.key_frame_interval = config.key_frame_interval;
+  settings.key_frame_interval = std::max(config.key_frame_interval, 1);
   settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
-  settings.spin = config.allow_spinning == 1;
-  settings.crops = config.person_crops == MAQ_PERSON_CROPS_AUTO  ? PersonCrops::kAuto
-                   : config.person_crops == MAQ_PERSON_CROPS_ALL ? PersonCrops::kAll
-                                                                 : PersonCrops::kOff;
+  settings.spin = may_spin(config.model);
+  settings.crops = config.person_crops == MAQ_DENSEPOSE_CROPS_AUTO  ? PersonCrops::kAuto
+                   : config.person_crops == MAQ_DENSEPOSE_CROPS_ALL ? PersonCrops::kAll
+                                                                    : PersonCrops::kOff;
   settings.crop_side_px = config.person_crop_px;
-  settings.provider = config.provider;
+  settings.provider = config.model.provider;
   return settings;
 }
 
@@ -107,11 +98,12 @@ maq_status maq_densepose_create(maq_context* context, const maq_densepose_config
     require_argument(densepose, "densepose");
     const maq_densepose_config config = read_densepose_config(given, "config");
     const DensePoseSettings settings = densepose_settings(config, "config");
-    const Bundle bundle = read_bundle_argument(config, "config", kDensePoseBundle);
+    const Bundle bundle = read_bundle_argument(config.model, "config.model", kDensePoseBundle);
     auto networks = std::make_unique<DensePose>(context->state->onnxruntime(), bundle, settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                                 bundle.manifest.precision, ") loaded, ", networks->threads(), " thread(s)");
-    *densepose = new maq_densepose(context->state, std::move(networks), config.result_pool_size);
+    *densepose = new maq_densepose(context->state, std::move(networks),
+                                   config.result_pool_size != 0 ? config.result_pool_size : kDefaultResultPoolSize);
     return MAQ_OK;
   });
 }
@@ -169,12 +161,13 @@ uint32_t maq_densepose_result_get_person_count(const maq_densepose_result* resul
   return result == nullptr ? 0 : uint32_t(result->result.people.size());
 }
 
-maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index, maq_person* person) {
+maq_status maq_densepose_result_get_person(const maq_densepose_result* result, uint32_t index,
+                                           maq_densepose_person* person) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
     require_index("index", index, result->result.people.size());
     const Person& from = result->result.people[index];
-    const maq_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, MAQ_NO_ID};
+    const maq_densepose_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, MAQ_NO_ID};
     write_struct(person, "person", filled);
     return MAQ_OK;
   });
@@ -239,7 +232,7 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
 }
 
 maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size) {
-  return init_config(__func__, drawing, struct_size, default_drawing(), "drawing");
+  return init_config(__func__, drawing, struct_size, maq_densepose_drawing{}, "drawing");
 }
 
 maq_status maq_densepose_result_draw(const maq_densepose_result* result, const maq_frame* frame,
@@ -249,7 +242,7 @@ maq_status maq_densepose_result_draw(const maq_densepose_result* result, const m
     require_argument(result, "result");
     require_argument(rgba, "rgba");
     if (frame != nullptr) require_argument(frame, "frame");
-    maq_densepose_drawing drawing = read_config(given, "drawing", default_drawing());
+    maq_densepose_drawing drawing = read_config(given, "drawing", maq_densepose_drawing{});
     const DensePlanes& planes = result->result.planes;
     const ImageView* const image = frame == nullptr ? nullptr : &frame->frame.image;
     if (image != nullptr && (image->width_px != planes.width_px || image->height_px != planes.height_px)) {
@@ -268,27 +261,28 @@ maq_status maq_densepose_result_draw(const maq_densepose_result* result, const m
                           ", ", drawing.y_px, "), which are not inside the frame of ", planes.width_px, " x ",
                           planes.height_px, ".");
     }
-    require_range("drawing.opacity", drawing.opacity, 0, 255);
+    require_range("drawing.opacity", drawing.opacity, MAQ_DENSEPOSE_INVISIBLE, 255);
+    const int opacity = drawing.opacity == 0 ? kDefaultOpacity : std::max(drawing.opacity, 0);
     require_range("drawing.is_mirrored", drawing.is_mirrored, 0, 1);
     const size_t stride =
         checked_stride(MAQ_PIXEL_RGBA8, drawing.width_px, drawing.height_px, stride_bytes, size_bytes);
-    paint_people(
-        planes, image,
-        {drawing.x_px, drawing.y_px, drawing.width_px, drawing.height_px, drawing.opacity, drawing.is_mirrored == 1},
-        rgba, stride);
+    paint_people(planes, image,
+                 {drawing.x_px, drawing.y_px, drawing.width_px, drawing.height_px, opacity, drawing.is_mirrored == 1},
+                 rgba, stride);
     return MAQ_OK;
   });
 }
 
-maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* folder, const char* stem) {
+maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* path) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
-    require_argument(folder, "folder");
-    require_argument(stem, "stem");
-    if (*stem == '\0' || std::strchr(stem, '/') != nullptr) {
-      throw ArgumentError("stem is \"", stem, "\", but must be the beginning of a file name, without a folder.");
+    require_argument(path, "path");
+    const std::string given = path;
+    const size_t stem_begin = given.rfind('/') + 1;
+    if (stem_begin == given.size()) {
+      throw ArgumentError("path is \"", path, "\", but must end with the beginning of a file name.");
     }
-    write_result_files(result->result, folder, stem);
+    write_result_files(result->result, given.substr(0, stem_begin), given.substr(stem_begin));
     return MAQ_OK;
   });
 }

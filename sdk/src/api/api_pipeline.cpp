@@ -30,7 +30,7 @@ maq_pipeline_config default_pipeline_config() {
 PipelineModel model_of(const maq_densepose_config* given, const char* name) {
   const maq_densepose_config config = read_densepose_config(given, name);
   const DensePoseSettings settings = densepose_settings(config, name);
-  return {bundle_reader(config, name, kDensePoseBundle), settings, nullptr};
+  return {bundle_reader(config.model, concatenate(name, ".model").c_str(), kDensePoseBundle), settings, nullptr};
 }
 
 PipelineModel model_of(const maq_edges_config* given, const char* name, const maq_edges_curves_config* curves,

@@ -20,6 +20,10 @@ Bundle read_bundle_argument(const Config& config, const char* name, const char* 
   return read_bundle_argument(name, config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
 }
 
+inline Bundle read_bundle_argument(const maq_model_options& options, const char* name, const char* installed) {
+  return read_bundle_argument(name, options.bundle_path, options.bundle_files, options.bundle_file_count, installed);
+}
+
 // The same for later, and more than once: `files` are copied. Throws ArgumentError; the reader throws the rest.
 std::function<Bundle()> bundle_reader(const char* config, const char* path, const maq_memory_file* files,
                                       uint32_t file_count, const char* installed);
@@ -27,6 +31,11 @@ std::function<Bundle()> bundle_reader(const char* config, const char* path, cons
 template <class Config>
 std::function<Bundle()> bundle_reader(const Config& config, const char* name, const char* installed) {
   return bundle_reader(name, config.bundle_path, config.bundle_files, config.bundle_file_count, installed);
+}
+
+inline std::function<Bundle()> bundle_reader(const maq_model_options& options, const char* name,
+                                             const char* installed) {
+  return bundle_reader(name, options.bundle_path, options.bundle_files, options.bundle_file_count, installed);
 }
 
 }  // namespace maq

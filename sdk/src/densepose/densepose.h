@@ -25,7 +25,7 @@
 
 namespace maq {
 
-enum class PersonCrops { kOff, kAuto, kAll };  // as maq_person_crops
+enum class PersonCrops { kOff, kAuto, kAll };  // as maq_densepose_crops
 
 // As in maq_densepose_config, whose comments say what they mean; 0 (a negative threshold): the bundle's value.
 struct DensePoseSettings {

@@ -84,19 +84,19 @@ std::string bundle_of(const ModelOptions& options) {
 
 maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle) {
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = options.threads;
+  config.model.bundle_path = bundle.c_str();
+  config.model.threads = options.threads;
   config.long_side_px = options.size;
   config.score_threshold = options.threshold;
   config.max_proposals = options.max_proposals;
   config.key_frame_interval = options.key_frames;
   config.min_person_height_px = options.min_person_height_px;
   config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
-  config.allow_spinning = options.no_spin ? 0 : 1;
-  config.person_crops = options.crops == "auto"  ? MAQ_PERSON_CROPS_AUTO
-                        : options.crops == "all" ? MAQ_PERSON_CROPS_ALL
-                                                 : MAQ_PERSON_CROPS_OFF;
+  config.model.spinning = options.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
+  config.person_crops = options.crops == "auto"  ? MAQ_DENSEPOSE_CROPS_AUTO
+                        : options.crops == "all" ? MAQ_DENSEPOSE_CROPS_ALL
+                                                 : MAQ_DENSEPOSE_CROPS_OFF;
   config.person_crop_px = options.crop_px;
-  config.provider = provider_of(options);
+  config.model.provider = provider_of(options);
   return config;
 }

@@ -22,9 +22,9 @@ maq_provider provider_of(const NetworkOptions& options);
 
 struct ModelOptions : NetworkOptions {
   int size = 0;
-  float threshold = -1;
+  float threshold = 0;
   int max_proposals = 0;
-  int key_frames = 1;
+  int key_frames = 0;
   int min_person_height_px = 0;
   std::string crops = "off";
   int crop_px = 0;

@@ -117,7 +117,7 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
     cv::Mat overlay = options.overlay ? draw_overlay(image_of(given.frame), result) : cv::Mat();
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
     make_folder_of(fs::path(options.out) / (given.stem + "_IUV.png"));
-    result.save(options.out, given.stem);
+    result.save((fs::path(options.out) / given.stem).string());
     if (options.overlay && of_clip) clip.add(overlay);
     if (options.overlay && !of_clip) {
       frame_of(context, overlay).save((fs::path(options.out) / (given.stem + "_overlay.png")).string());

@@ -132,7 +132,7 @@ void paint(const Surface& surface, float line_px, cv::Mat& canvas) {
   }
 }
 
-void draw_box(const maq_person& person, int scale, cv::Mat& canvas) {
+void draw_box(const maq_densepose_person& person, int scale, cv::Mat& canvas) {
   constexpr int kShift = 3;  // sub-pixel digits of OpenCV's coordinates
   const auto fixed = [&](float at) { return int(std::lround(double(at) * scale * (1 << kShift))); };
   const cv::Point corner(fixed(person.box_px[0]), fixed(person.box_px[1]));
@@ -164,7 +164,7 @@ cv::Mat draw_overlay(const cv::Mat& image, const maquette::DensePoseResult& resu
   cv::Mat canvas;
   cv::resize(image, canvas, image.size() * scale, 0, 0, scale == 1 ? cv::INTER_NEAREST : cv::INTER_CUBIC);
   // The people stand out from a slightly darkened picture.
-  const std::vector<maq_person> people = result.people();
+  const std::vector<maq_densepose_person> people = result.people();
   if (!people.empty()) canvas.convertTo(canvas, -1, 0.82, 0);
 
   const cv::Mat part = plane_of(result, MAQ_DENSEPOSE_PLANE_PART);

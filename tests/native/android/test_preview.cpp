@@ -60,7 +60,7 @@ class Preview : public ::testing::Test {
     drawing.y_px = y;
     drawing.width_px = width;
     drawing.height_px = height;
-    drawing.opacity = style.opacity;
+    drawing.opacity = style.opacity == 0 ? MAQ_DENSEPOSE_INVISIBLE : style.opacity;
     drawing.is_mirrored = style.is_mirrored ? 1 : 0;
     std::vector<uint32_t> rgba(size_t(width) * size_t(height));
     result_.draw(&frame_, drawing, reinterpret_cast<uint8_t*>(rgba.data()), 0, rgba.size() * 4);

@@ -41,7 +41,7 @@ TEST_F(ApiArguments, NullHandlesAreRefusedByName) {
   maq_source_info info{};
   maq_densepose_stats stats{};
   maq_densepose_config config{};
-  maq_person person{};
+  maq_densepose_person person{};
   const uint8_t* pixels = nullptr;
   size_t stride = 0;
   uint8_t byte = 0;
@@ -210,43 +210,44 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   const auto expect_refused = [&](const char* name, auto change) {
     maq_densepose_config config;
     maq_densepose_config_init(&config, sizeof config);
-    config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+    config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
     change(config);
     maq_densepose* densepose = nullptr;
     expect_error(maq_densepose_create(context_, &config, &densepose), MAQ_ERROR_INVALID_ARGUMENT, context_, name);
   };
   const maq_memory_file file{"manifest.json", nullptr, 1};
   expect_refused("both bundle_path and bundle_files", [&](auto& config) {
-    config.bundle_files = &file;
-    config.bundle_file_count = 1;
+    config.model.bundle_files = &file;
+    config.model.bundle_file_count = 1;
   });
   expect_refused("bundle_files[0] has no data", [&](auto& config) {
-    config.bundle_path = nullptr;
-    config.bundle_files = &file;
-    config.bundle_file_count = 1;
+    config.model.bundle_path = nullptr;
+    config.model.bundle_files = &file;
+    config.model.bundle_file_count = 1;
   });
   expect_refused("bundle_files is NULL", [](auto& config) {
-    config.bundle_path = nullptr;
-    config.bundle_file_count = 1;
+    config.model.bundle_path = nullptr;
+    config.model.bundle_file_count = 1;
   });
-  expect_refused("config.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).",
-                 [](auto& config) { config.threads = -2; });
-  expect_refused("threads", [](auto& config) { config.threads = 65; });
+  expect_refused("config.model.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).",
+                 [](auto& config) { config.model.threads = -2; });
+  expect_refused("threads", [](auto& config) { config.model.threads = 65; });
   expect_refused("long_side_px", [](auto& config) { config.long_side_px = 31; });
   expect_refused("long_side_px", [](auto& config) { config.long_side_px = 2049; });
   expect_refused("score_threshold", [](auto& config) { config.score_threshold = 1.5f; });
   expect_refused("score_threshold", [](auto& config) { config.score_threshold = std::stof("nan"); });
   expect_refused("max_people", [](auto& config) { config.max_people = 256; });
-  expect_refused("result_pool_size", [](auto& config) { config.result_pool_size = 0; });
+  expect_refused("result_pool_size", [](auto& config) { config.result_pool_size = 65; });
   expect_refused("max_proposals", [](auto& config) { config.max_proposals = 1001; });
-  expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = 0; });
+  expect_refused("key_frame_interval", [](auto& config) { config.key_frame_interval = -1; });
   expect_refused("min_person_height_px", [](auto& config) { config.min_person_height_px = -1; });
   expect_refused("detail", [](auto& config) { reinterpret_cast<int32_t&>(config.detail) = 2; });
-  expect_refused("allow_spinning", [](auto& config) { config.allow_spinning = 2; });
+  expect_refused("model.spinning", [](auto& config) { reinterpret_cast<int32_t&>(config.model.spinning) = 3; });
+  expect_refused("score_threshold", [](auto& config) { config.score_threshold = -0.1f; });
   expect_refused("person_crops", [](auto& config) { reinterpret_cast<int32_t&>(config.person_crops) = 3; });
   expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 63; });
   expect_refused("person_crop_px", [](auto& config) { config.person_crop_px = 513; });
-  expect_refused("provider", [](auto& config) { reinterpret_cast<int32_t&>(config.provider) = 3; });
+  expect_refused("provider", [](auto& config) { reinterpret_cast<int32_t&>(config.model.provider) = 3; });
 }
 
 TEST_F(ApiArguments, ErrorsNameTheParameterOfTheHeader) {
@@ -280,9 +281,9 @@ TEST_F(ApiArguments, FieldsOfAConfigInAConfigAreNamedWithBoth) {
     maq_pipeline* pipeline = nullptr;
     expect_error(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
   };
-  expect_refused("config.densepose.threads is -2", [](auto& densepose, auto&) { densepose.threads = -2; });
-  expect_refused("config.densepose.bundle_files is NULL",
-                 [](auto& densepose, auto&) { densepose.bundle_file_count = 1; });
+  expect_refused("config.densepose.model.threads is -2", [](auto& densepose, auto&) { densepose.model.threads = -2; });
+  expect_refused("config.densepose.model.bundle_files is NULL",
+                 [](auto& densepose, auto&) { densepose.model.bundle_file_count = 1; });
   expect_refused("config.source.queue_length is 0", [](auto&, auto& source) { source.queue_length = 0; });
   expect_refused("config.source.struct_size is 1", [](auto&, auto& source) { source.struct_size = 1; });
 }
@@ -297,7 +298,7 @@ TEST_F(ApiArguments, WhyNothingWasMadeIsFoundWithAndWithoutTheContext) {
   expect_text(maq_source_create(context_, "image:/no/such/1.jpg", nullptr, &source), "/no/such/1.jpg");
   maq_densepose_config densepose_config;
   ASSERT_EQ(maq_densepose_config_init(&densepose_config, sizeof densepose_config), MAQ_OK);
-  densepose_config.bundle_path = "/no/such/2";
+  densepose_config.model.bundle_path = "/no/such/2";
   maq_densepose* densepose = nullptr;
   expect_text(maq_densepose_create(context_, &densepose_config, &densepose), "/no/such/2");
   maq_pipeline_config pipeline_config{};

@@ -60,8 +60,8 @@ TEST(ApiDensePose, GivesPeoplePlanesAndStats) {
 
 maquette::DensePose with_threads(const maquette::Context& context, int threads) {
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = kBundle;
-  config.threads = threads;
+  config.model.bundle_path = kBundle;
+  config.model.threads = threads;
   return maquette::DensePose(context, config);
 }
 
@@ -151,7 +151,7 @@ TEST(ApiDensePose, PeopleAreReadByIndexAndHaveNoIdYet) {
   EXPECT_EQ(result.person_count(), 1u);
   EXPECT_EQ(result.person(0).id, MAQ_NO_ID);
   EXPECT_GT(result.person(0).score, 0);
-  maq_person person{};
+  maq_densepose_person person{};
   person.struct_size = sizeof person;
   EXPECT_EQ(maq_densepose_result_get_person(result.get(), 1, &person), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_densepose_result_get_person(result.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
@@ -172,14 +172,14 @@ TEST(ApiDensePose, ABundleInMemoryIsCopiedAndGivesTheSame) {
     std::vector<maq_memory_file> files;
     for (const auto& [name, bytes] : contents) files.push_back({name.c_str(), bytes.data(), bytes.size()});
     maq_densepose_config config = maquette::default_densepose_config();
-    config.bundle_files = files.data();
-    config.bundle_file_count = uint32_t(files.size());
+    config.model.bundle_files = files.data();
+    config.model.bundle_file_count = uint32_t(files.size());
     densepose = std::make_unique<maquette::DensePose>(context, config);
     for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
   }
   maquette::DensePose from_folder(context, kBundle);
   const maquette::Frame frame(context, image.desc);
-  const maq_person found = densepose->run(frame).person(0), expected = from_folder.run(frame).person(0);
+  const maq_densepose_person found = densepose->run(frame).person(0), expected = from_folder.run(frame).person(0);
   EXPECT_EQ(std::memcmp(&found, &expected, sizeof found), 0);
 }
 
@@ -246,11 +246,11 @@ TEST(ApiDensePose, ADamagedBundleIsAStatusOfTheContext) {
   bundle.flip_byte("trunk.onnx");
   maq_densepose_config config = maquette::default_densepose_config();
   const std::string path = bundle.path();
-  config.bundle_path = path.c_str();
+  config.model.bundle_path = path.c_str();
   maq_densepose* densepose = nullptr;
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_BAD_BUNDLE);
   EXPECT_NE(std::string(maq_last_error(context.get())).find("trunk.onnx"), std::string::npos);
-  config.bundle_path = "/no/such/bundle";
+  config.model.bundle_path = "/no/such/bundle";
   EXPECT_EQ(maq_densepose_create(context.get(), &config, &densepose), MAQ_ERROR_NOT_FOUND);
   EXPECT_EQ(densepose, nullptr);
 }

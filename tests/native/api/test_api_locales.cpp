@@ -98,7 +98,7 @@ TEST_F(ApiLocales, ManifestsAreReadAndResultsWrittenAsInC) {
   const auto saved = [&](const std::string& stem) {
     maquette::DensePose densepose(context_, MAQ_TEST_DATA "/tiny_bundle");
     const maquette::DensePoseResult result = densepose.run(maquette::Frame(context_, desc));
-    EXPECT_EQ(maq_densepose_result_save(result.get(), folder_.path().c_str(), stem.c_str()), MAQ_OK);
+    EXPECT_EQ(maq_densepose_result_save(result.get(), folder_.file(stem).c_str()), MAQ_OK);
     return read_text(folder_.file(stem + ".json"));
   };
   const std::string in_c = saved("c");

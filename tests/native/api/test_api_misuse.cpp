@@ -81,7 +81,7 @@ TEST_F(ApiMisuse, WhatIsGivenBackTwiceIsTold) {
   maq_frame* const frame = acquire(source);
   maq_densepose* densepose = nullptr;
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   ASSERT_EQ(maq_densepose_create(context_.get(), &config, &densepose), MAQ_OK) << text();
   maq_densepose_result* result = nullptr;
   ASSERT_EQ(maq_densepose_run(densepose, frame, &result), MAQ_OK) << text();

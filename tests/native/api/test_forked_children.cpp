@@ -12,8 +12,8 @@ constexpr unsigned kLimit_s = 30;  // for calls that return at once
 
 maq_densepose_config two_threads() {
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  config.threads = 2;
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  config.model.threads = 2;
   return config;
 }
 

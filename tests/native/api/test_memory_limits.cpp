@@ -110,8 +110,8 @@ void find_onnxruntime() {
 
 maq_densepose_config one_thread() {
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = kTinyBundle;
-  config.threads = 1;
+  config.model.bundle_path = kTinyBundle;
+  config.model.threads = 1;
   return config;
 }
 
@@ -236,10 +236,10 @@ TEST(MemoryLimits, FilesOfAResultAreOutOfMemory) {
   maquette::Source source(context, "stub:people?size=160x120");
   maquette::DensePose densepose(context, one_thread());
   const maquette::DensePoseResult result = densepose.run(*source.next());
-  result.save(folder.path().string(), "a");  // opens the codecs: glibc's loader ends the process where its memory fails
+  result.save(folder.file("a"));  // opens the codecs: glibc's loader ends the process where its memory fails
   FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
     failing.begin();
-    return maq_densepose_result_save(result.get(), folder.path().c_str(), "a");
+    return maq_densepose_result_save(result.get(), folder.file("a").c_str());
   });
 }
 
@@ -281,7 +281,7 @@ ChildOutcome run_within(rlim_t mebibytes, const std::string& uri, const std::str
     if (status == MAQ_OK) status = maq_densepose_create(context, &config, &densepose);
     if (status == MAQ_OK) status = maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame);
     if (status == MAQ_OK) status = maq_densepose_run(densepose, frame, &result);
-    if (status == MAQ_OK) status = maq_densepose_result_save(result, folder.c_str(), "a");
+    if (status == MAQ_OK) status = maq_densepose_result_save(result, (folder + "/a").c_str());
     const std::string said = std::string(maq_status_get_name(status)) + " " + maq_last_error(nullptr);
     maq_densepose_result_release(result);
     maq_frame_release(frame);

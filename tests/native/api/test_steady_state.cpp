@@ -312,7 +312,7 @@ TEST(SteadyState, AFrameTakesNothingFromTheHeap) {
     for (int i = 0; i < frames; ++i) {
       maq_frame* frame = nullptr;
       maq_densepose_result* result = nullptr;
-      maq_person found{};
+      maq_densepose_person found{};
       found.struct_size = sizeof found;
       ASSERT_EQ(maq_source_acquire_frame(source.get(), MAQ_WAIT_FOREVER, &frame), MAQ_OK);
       ASSERT_EQ(maq_densepose_run(densepose.get(), frame, &result), MAQ_OK);

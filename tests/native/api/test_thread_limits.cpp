@@ -57,8 +57,8 @@ TEST(ThreadLimits, ADensePoseModelRunsOnTheThreadsThereAreAndWarns) {
       Log log;
       const maquette::Context context = logging_context(log);
       maq_densepose_config config = maquette::default_densepose_config();
-      config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-      config.threads = threads;
+      config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+      config.model.threads = threads;
       threads_left = given;
       maquette::DensePose densepose(context, config);
       maquette::Source source(context, "stub:people");
@@ -82,8 +82,8 @@ TEST(ThreadLimits, WhereALimitOfMemoryIsNearNetworksRunOnOneThreadAndSaySo) {
       Log log;
       const maquette::Context context = logging_context(log);
       maq_densepose_config config = maquette::default_densepose_config();
-      config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-      config.threads = 4;
+      config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+      config.model.threads = 4;
       maquette::DensePose densepose(context, config);
       maquette::Source source(context, "stub:people");
       densepose.run(*source.next());

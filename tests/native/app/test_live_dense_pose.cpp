@@ -33,7 +33,7 @@ class Live {
 
   static maq_densepose_config config_of(const std::string& bundle) {
     maq_densepose_config config = maquette::default_densepose_config();
-    config.bundle_path = bundle.c_str();
+    config.model.bundle_path = bundle.c_str();
     return config;
   }
 

@@ -13,7 +13,7 @@ class MappedFrame : public ::testing::Test {
  protected:
   maquette::PipelineResult mapped() {
     maq_densepose_config densepose = maquette::default_densepose_config();
-    densepose.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+    densepose.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
     maq_pipeline_config config = maquette::default_pipeline_config();
     config.densepose = &densepose;
     maquette::Pipeline pipeline(context_, config);

@@ -129,8 +129,8 @@ TEST_F(EdgesPipeline, ModelsTakeTurns) {
   live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=200");
   EXPECT_TRUE(live.next(kLongEnoughNs)->curves);
   maq_densepose_config people = maquette::default_densepose_config();
-  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  people.threads = 1;
+  people.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  people.model.threads = 1;
   live.stop();
   live.set_densepose(people);
   live.set_source("stub:pattern?size=96x72&live=1&fps=200");

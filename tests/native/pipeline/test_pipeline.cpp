@@ -20,8 +20,8 @@ constexpr auto kLongEnough = 60s;  // for anything, on a machine with other work
 
 maq_densepose_config densepose_config(const std::string& bundle = kTinyBundle) {
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = 1;
+  config.model.bundle_path = bundle.c_str();
+  config.model.threads = 1;
   return config;
 }
 

@@ -130,8 +130,8 @@ TEST_F(PredictionPipeline, ModelsTakeTurns) {
   EXPECT_EQ(live.stats().key_frame_interval, 0);
   EXPECT_FALSE(live.surface());
   maq_densepose_config people = maquette::default_densepose_config();
-  people.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  people.threads = 1;
+  people.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  people.model.threads = 1;
   live.stop();
   live.set_densepose(people);
   live.set_source("stub:people?size=96x72&live=1&fps=200");

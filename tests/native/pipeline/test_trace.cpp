@@ -9,10 +9,10 @@
 namespace {
 
 // Each frame once, as there is time for all.
-void run_frames(const maquette::Context& context, maq_person_crops crops, int key_frame_interval) {
+void run_frames(const maquette::Context& context, maq_densepose_crops crops, int key_frame_interval) {
   maq_densepose_config config;
   maq_densepose_config_init(&config, sizeof config);
-  config.bundle_path = MAQ_TEST_MODELS "/densepose-b-int8";
+  config.model.bundle_path = MAQ_TEST_MODELS "/densepose-b-int8";
   config.long_side_px = 256;
   config.person_crops = crops;
   config.key_frame_interval = key_frame_interval;
@@ -27,10 +27,10 @@ TEST(Trace, EachStageOfAFrameIsASection) {
   const maquette::Context context;
   fake_trace_record(true);
   fake_trace_sections();
-  run_frames(context, MAQ_PERSON_CROPS_OFF, 1);
+  run_frames(context, MAQ_DENSEPOSE_CROPS_OFF, 1);
   const std::string one = std::string(kFrame) + "maquette decode\n";
   EXPECT_EQ(fake_trace_sections(), one + one);
-  run_frames(context, MAQ_PERSON_CROPS_ALL, 2);
+  run_frames(context, MAQ_DENSEPOSE_CROPS_ALL, 2);
   EXPECT_EQ(fake_trace_sections(),
             std::string(kFrame) + "maquette crops\nmaquette decode\nmaquette crops\nmaquette decode\n");
   fake_trace_record(false);
@@ -44,7 +44,7 @@ TEST(Trace, APipelineAlsoWaitsForFrames) {
   maq_pipeline_config_init(&config, sizeof config);
   maq_densepose_config densepose;
   maq_densepose_config_init(&densepose, sizeof densepose);
-  densepose.bundle_path = MAQ_TEST_MODELS "/densepose-b-int8";
+  densepose.model.bundle_path = MAQ_TEST_MODELS "/densepose-b-int8";
   densepose.long_side_px = 256;
   config.densepose = &densepose;
   {
@@ -62,7 +62,7 @@ TEST(Trace, WithoutARecordingNothingIsWritten) {
   const maquette::Context context;
   fake_trace_record(false);
   fake_trace_sections();
-  run_frames(context, MAQ_PERSON_CROPS_OFF, 1);
+  run_frames(context, MAQ_DENSEPOSE_CROPS_OFF, 1);
   EXPECT_EQ(fake_trace_sections(), "");
 }
 

@@ -141,8 +141,8 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     return;
   }
   maq_densepose_config config = maquette::default_densepose_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = options.network.threads;
+  config.model.bundle_path = bundle.c_str();
+  config.model.threads = options.network.threads;
   config.detail = MAQ_DENSEPOSE_DETAIL_PART;
   maquette::DensePose densepose(context, config);
   for (Photo& photo : photos) {

@@ -55,8 +55,8 @@ inline maq_densepose_config densepose_config(JNIEnv* env, const Bundle& bundle, 
   const std::vector<jdouble> from = numbers(env, values, 13);
   maq_densepose_config config;
   check(maq_densepose_config_init(&config, sizeof config));
-  bundle.put_into(config);
-  config.threads = int32_t(from[0]);
+  bundle.put_into(config.model);
+  config.model.threads = int32_t(from[0]);
   config.long_side_px = int32_t(from[1]);
   config.score_threshold = float(from[2]);
   config.max_people = int32_t(from[3]);
@@ -65,10 +65,10 @@ inline maq_densepose_config densepose_config(JNIEnv* env, const Bundle& bundle, 
   config.key_frame_interval = int32_t(from[6]);
   config.min_person_height_px = int32_t(from[7]);
   config.detail = maq_densepose_detail(int32_t(from[8]));
-  config.allow_spinning = int32_t(from[9]);
-  config.person_crops = maq_person_crops(int32_t(from[10]));
+  config.model.spinning = from[9] != 0 ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
+  config.person_crops = maq_densepose_crops(int32_t(from[10]));
   config.person_crop_px = int32_t(from[11]);
-  config.provider = maq_provider(int32_t(from[12]));
+  config.model.provider = maq_provider(int32_t(from[12]));
   return config;
 }
 

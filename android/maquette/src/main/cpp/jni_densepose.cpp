@@ -57,10 +57,10 @@ MAQ_NATIVE(void, releaseResult)(JNIEnv*, jclass, jlong result) {
   maq_densepose_result_release(object<maq_densepose_result>(result));
 }
 
-MAQ_NATIVE(void, saveResult)(JNIEnv* env, jclass, jlong result, jbyteArray folder, jbyteArray stem) {
+MAQ_NATIVE(void, saveResult)(JNIEnv* env, jclass, jlong result, jbyteArray path) {
   call(env, [&] {
-    const std::string to = maq_jni::text(env, folder), name = maq_jni::text(env, stem);
-    check(maq_densepose_result_save(object<maq_densepose_result>(result), to.c_str(), name.c_str()));
+    const std::string to = maq_jni::text(env, path);
+    check(maq_densepose_result_save(object<maq_densepose_result>(result), to.c_str()));
   });
 }
 
@@ -82,7 +82,7 @@ MAQ_NATIVE(jfloatArray, peopleOfResult)(JNIEnv* env, jclass, jlong result) {
     const auto* const from = object<maq_densepose_result>(result);
     std::vector<jfloat> values;
     for (uint32_t i = 0; i < maq_densepose_result_get_person_count(from); ++i) {
-      maq_person person;
+      maq_densepose_person person;
       person.struct_size = sizeof person;
       check(maq_densepose_result_get_person(from, i, &person));
       values.insert(values.end(), person.box_px, person.box_px + 4);

@@ -115,7 +115,7 @@ MAQ_NATIVE_OF(NativePicture, void, drawResult)
     check(maq_densepose_result_get_size(from, &width, &height));
     maq_densepose_drawing drawing;
     check(maq_densepose_drawing_init(&drawing, sizeof drawing));
-    drawing.opacity = opacity;
+    drawing.opacity = opacity == 0 ? MAQ_DENSEPOSE_INVISIBLE : opacity;
     draw_on(env, onto, is_bitmap, width, height, [&](const Canvas& canvas) {
       return maq_densepose_result_draw(from, object<maq_frame>(frame), &drawing, canvas.rgba, canvas.stride_bytes,
                                        canvas.size_bytes);

@@ -102,7 +102,7 @@ bool Preview::draw(const maq_frame* frame, const maq_densepose_result* result, c
     drawing.y_px = layout.from_y;
     drawing.width_px = layout.width;
     drawing.height_px = layout.height;
-    drawing.opacity = style.opacity;
+    drawing.opacity = style.opacity == 0 ? MAQ_DENSEPOSE_INVISIBLE : style.opacity;
     drawing.is_mirrored = style.is_mirrored ? 1 : 0;
     const size_t stride = size_t(buffer.stride) * 4;
     uint8_t* const first = static_cast<uint8_t*>(buffer.bits) + size_t(layout.to_y) * stride + size_t(layout.to_x) * 4;

@@ -45,9 +45,9 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      *
      * @property threads 0: the large cores, at most 4; [THREADS_MEASURED]: as many of these as pay, measured while the
      *   networks are made, which takes up to about half a second longer. [DensePoseResult.Stats.threads] tells.
-     * @property scoreThreshold min score of a person; negative: the bundle's.
-     * @property resultPoolSize results that the app may hold at once.
-     * @property keyFrameInterval 1: people are looked for in each frame; N: in every N-th frame of a stream.
+     * @property scoreThreshold minimum score of a person.
+     * @property resultPoolSize results that the app may hold at once, 1 to 64; 0: 4.
+     * @property keyFrameInterval 0 and 1: people are detected in each frame; N: in every N-th frame of a stream.
      * @property minPersonHeightPx people less tall than this in the frame may be missed.
      * @property allowSpinning true: idle threads spin for a while, which is faster; false: they sleep, which saves
      *   energy.
@@ -57,11 +57,11 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     data class Config(
         val threads: Int = 0,
         val longSidePx: Int = 0,
-        val scoreThreshold: Float = -1f,
+        val scoreThreshold: Float = 0f,
         val maxPeople: Int = 0,
-        val resultPoolSize: Int = 4,
+        val resultPoolSize: Int = 0,
         val maxProposals: Int = 0,
-        val keyFrameInterval: Int = 1,
+        val keyFrameInterval: Int = 0,
         val minPersonHeightPx: Int = 0,
         val detail: Detail = Detail.SURFACE,
         val allowSpinning: Boolean = false,
@@ -250,15 +250,14 @@ class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * Writes three files in the DensePose convention, `<stem>_IUV.png` (I, U and V as blue, green and red),
-     * `<stem>_INDS.png` ([Plane.PERSON]) and `<stem>.json` (size, boxes, scores), atomically, into a folder that
-     * exists. Needs Android 11. Blocks while they are written.
+     * Writes three files in the DensePose convention: `<path>_IUV.png` (I, U and V as blue, green and red),
+     * `<path>_INDS.png` ([Plane.PERSON]) and `<path>.json` (size, boxes, scores). The folder of [path] exists; each
+     * file is written atomically. Needs Android 11. Blocks while the files are written.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a stem that names a folder), [Status.UNSUPPORTED] (an
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a path that ends with "/"), [Status.UNSUPPORTED] (an
      *   older Android) and [Status.UNWRITABLE].
      */
-    fun save(folder: String, stem: String) =
-        handle.use { Native.saveResult(it, folder.toByteArray(), stem.toByteArray()) }
+    fun save(path: String) = handle.use { Native.saveResult(it, path.toByteArray()) }
 
     /** Of the run that gave the result. */
     val stats: Stats

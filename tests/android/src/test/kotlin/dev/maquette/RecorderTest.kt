@@ -79,7 +79,7 @@ class RecorderTest : AndroidTest() {
         maquette.densePose(ModelBundle.ofFolder(TestFiles.bundle.path)).use { densePose ->
             maquette.decode(TestFiles.photo.readBytes()).use { frame ->
                 densePose.run(frame).use { result ->
-                    result.save(folder.path, "föto")
+                    result.save(File(folder, "föto").path)
                     val names = setOf("föto_IUV.png", "föto_INDS.png", "föto.json")
                     assertEquals(names, folder.list()!!.toSet())
                     val planes = listOf(DensePoseResult.Plane.V, DensePoseResult.Plane.U, DensePoseResult.Plane.PART)
@@ -99,8 +99,8 @@ class RecorderTest : AndroidTest() {
                     assertEquals(frame.widthPx, json.getInt("width"))
                     val box = json.getJSONArray("people").getJSONObject(0).getJSONArray("box")
                     assertEquals(result.people[0].left.toDouble(), box.getDouble(0), 0.006)
-                    failure(Status.INVALID_ARGUMENT) { result.save(folder.path, "other/föto") }
-                    failure(Status.UNWRITABLE) { result.save(File(folder, "no").path, "föto") }
+                    failure(Status.INVALID_ARGUMENT) { result.save(folder.path + "/") }
+                    failure(Status.UNWRITABLE) { result.save(File(folder, "no/föto").path) }
                 }
                 val picture = File(folder, "phöto.png")
                 frame.save(picture.path)

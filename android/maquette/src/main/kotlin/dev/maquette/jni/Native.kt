@@ -80,7 +80,7 @@ internal object Native {
     @JvmStatic external fun surfaceOfDensePose(densePose: Long): FloatArray?
 
     @JvmStatic external fun releaseResult(result: Long)
-    @JvmStatic external fun saveResult(result: Long, folder: ByteArray, stem: ByteArray)
+    @JvmStatic external fun saveResult(result: Long, path: ByteArray)
     @JvmStatic external fun sizeOfResult(result: Long): IntArray
     @JvmStatic external fun peopleOfResult(result: Long): FloatArray
 

@@ -97,8 +97,8 @@ test-newcomer:  ## the commands of README.md in a bare Debian, from top to botto
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench
 	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target measure_start measure_live_source measure_live_scene \
-	    measure_frame_budget measure_edges measure_prediction find_motion print_solids_truth
+	@cmake --build --preset release -j $(JOBS) --target measure_startup measure_live_source measure_live_scene \
+	    measure_frame_budget measure_edges measure_prediction find_motion print_solids_truth extract_edge_curves
 	@.venv/bin/python -m benchmarks
 
 .PHONY: format

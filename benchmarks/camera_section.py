@@ -16,7 +16,7 @@ def section(measured: dict) -> tuple[str, list]:
         "How frames get from a camera to the app, which does nothing with them. The cameras of the first table are "
         "in a virtual machine with Debian's kernel, its V4L2 drivers and its USB. Its processor is emulated: one "
         "core that takes a nanosecond for each instruction and knows no caches, on a clock of its own. So these "
-        "figures come out alike however busy this machine is, and tell what the kernel and the SDK do, not how fast "
+        "metrics come out alike however busy this machine is, and tell what the kernel and the SDK do, not how fast "
         "a processor is."
     ]
     delivered = delivery_rows(measured["guest"])

@@ -4,7 +4,7 @@
     python -m benchmarks --only cameras --no-guest   without the virtual machine
 
 Measured by `maquette play` in two places. The guest is a real kernel with its drivers in a virtual machine
-(tests/camera_vm, guest "figures"), with the kernel's test camera and a virtual USB camera; its clock counts
+(tests/camera_vm, guest "metrics"), with the kernel's test camera and a virtual USB camera; its clock counts
 instructions, so that its times come out alike however busy this machine is. The host is this machine, with a stub and a
 recording replayed as cameras.
 """
@@ -28,7 +28,7 @@ HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", 
                 "camera_fault_replug_ms", "camera_allocations")  # fmt: skip
 GUEST_FIGURES = ("camera_vivid_dropped_frames", "camera_vivid_fps", "camera_uvc_dropped_frames", "camera_uvc_fps",
                  "camera_v4l2_allocations", "camera_noticed_ms", "camera_replug_ms", "camera_reopen_ms")  # fmt: skip
-FIGURES = HOST_FIGURES + GUEST_FIGURES
+METRICS = HOST_FIGURES + GUEST_FIGURES
 COUNTER = Path("benchmarks/count_allocations.c")
 STUB = "stub:pattern?live=1&size=640x480&fps=30"
 COUNTED = "stub:pattern?live=1&size=320x240&fps=400"
@@ -49,7 +49,7 @@ class Outage:
 
 
 def play(uri: str, *arguments: str, **environment: str) -> dict:
-    """The figures of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
+    """The metrics of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
     if not frame_time.PROGRAM.exists():
         raise FileNotFoundError(f"{frame_time.PROGRAM} is not there: make build")
     with tempfile.TemporaryDirectory() as folder:
@@ -87,7 +87,7 @@ def outages(played: dict, cycles: list[dict]) -> list[Outage]:
 
 
 def fault_outage(absence_s: float) -> Outage:
-    """Of a stub that is away for so long. Its time starts when it is opened, a little later than that of its figures:
+    """Of a stub that is away for so long. Its time starts when it is opened, a little later than that of its metrics:
     both are too long by that."""
     uri = f"{STUB}&unplug={absence_s:g}s@{UNPLUG_AT_S:g}s"
     played = play(uri, "--seconds", str(UNPLUG_AT_S + absence_s + 1))
@@ -144,7 +144,7 @@ def host_figures(measured: dict) -> dict[str, float]:
 def measure_guest(frames: int) -> tuple[dict, str]:
     """What the guest said, by name, and why something is missing ("" when nothing is)."""
     print("Cameras in a virtual machine: about a minute")
-    run = subprocess.run(["tests/camera_vm/run.sh", "figures"], env=os.environ | {"FRAMES": str(frames)},
+    run = subprocess.run(["tests/camera_vm/run.sh", "metrics"], env=os.environ | {"FRAMES": str(frames)},
                          stdout=subprocess.PIPE, text=True, check=False)  # fmt: skip
     return read_guest(run.stdout, run.returncode)
 
@@ -155,49 +155,49 @@ def read_guest(output: str, status: int) -> tuple[dict, str]:
     Raises ValueError for broken JSON.
     """
     lines = output.splitlines()
-    figures = {}
+    metrics = {}
     for line in lines:
         if line.startswith("figure "):
             _, name, text = line.split(" ", 2)
-            figures[name] = json.loads(text)
+            metrics[name] = json.loads(text)
     failed = [line.removeprefix("not ok ") for line in lines if line.startswith("not ok ")]
     if status == UNUSABLE:
-        return figures, next((line for line in reversed(lines) if line.strip()), "there is no virtual machine")
+        return metrics, next((line for line in reversed(lines) if line.strip()), "there is no virtual machine")
     if status != 0 and not failed:
         failed.append(f"tests/camera_vm/run.sh ended with status {status}")
-    if "plug" in figures:
+    if "plug" in metrics:
         try:
-            found = outages(figures["plug"]["play"], figures["plug"]["cycles"])
-            figures["outages"] = [vars(outage) for outage in found]
+            found = outages(metrics["plug"]["play"], metrics["plug"]["cycles"])
+            metrics["outages"] = [vars(outage) for outage in found]
         except ValueError as error:
             failed.append(str(error))
-    return figures, "; ".join(failed)
+    return metrics, "; ".join(failed)
 
 
 def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], dict[str, str]]:
-    """The figures, and why others are missing."""
-    figures = {}
+    """The metrics, and why others are missing."""
+    metrics = {}
     for camera in ("vivid", "uvc"):
         played = said.get(camera)
         if played is not None and played["frames"] == frames:
-            figures[f"camera_{camera}_dropped_frames"] = played["dropped_frames"]
-            figures[f"camera_{camera}_fps"] = played["fps"]
+            metrics[f"camera_{camera}_dropped_frames"] = played["dropped_frames"]
+            metrics[f"camera_{camera}_fps"] = played["fps"]
     counts = [said[name] for name in ("vivid_allocations", "uvc_allocations") if name in said]
     if len(counts) == 2:
-        figures["camera_v4l2_allocations"] = max(count["allocations"] / count["frames"] for count in counts)
+        metrics["camera_v4l2_allocations"] = max(count["allocations"] / count["frames"] for count in counts)
     if "outages" in said:
         for name in ("noticed_ms", "replug_ms", "reopen_ms"):
-            figures[f"camera_{name}"] = statistics.median(outage[name] for outage in said["outages"])
-    return figures, {name: why or "the guest did not say" for name in GUEST_FIGURES if name not in figures}
+            metrics[f"camera_{name}"] = statistics.median(outage[name] for outage in said["outages"])
+    return metrics, {name: why or "the guest did not say" for name in GUEST_FIGURES if name not in metrics}
 
 
 def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the figures that are gates, and why others are missing."""
+    """What was measured, the metrics that are targets, and why others are missing."""
     frames = 100 if quick else 1000
     host = measure_host(quick)
     said, why = measure_guest(frames) if with_guest else ({}, "left out by --no-guest")
     found, missing = guest_figures(said, frames, why)
-    figures = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
+    metrics = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
     others = host["others_fraction"]
     warnings = [f"other processes used {others:.0%} of the CPU (cameras)"] if others > MAX_OTHERS else []
-    return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "warnings": warnings}, figures, missing
+    return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "warnings": warnings}, metrics, missing

@@ -23,7 +23,7 @@ import numpy as np
 from tqdm import tqdm
 
 from benchmarks.frame_time import OthersFraction
-from benchmarks.window import DENSE_POSE, PROGRAMS
+from benchmarks.ui_latency import DENSE_POSE, PROGRAMS
 
 FRACTIONS = (1.0, 0.5, 0.25)  # of the processor's time
 ROOM = 1.3  # the budget, by the median time of a frame at all of it

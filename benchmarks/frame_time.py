@@ -60,7 +60,7 @@ class OthersFraction:
 
 
 def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict]:
-    """The scaling curves, the figures that are gates, and the machine."""
+    """The scaling curves, the metrics that are targets, and the machine."""
     runs = ["--runs", "20", "--seconds", "0"] if quick else ["--runs", "150", "--seconds", "3"]
     main = bench([people(k) for k in PEOPLE], *runs, "--threads", str(threads))
     sizes = bench([people(1, size) for size in SIZES], *runs, "--threads", str(threads))
@@ -72,15 +72,15 @@ def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, fl
     ]
     fps = {case["source"]: case["fps"] for case in main["cases"]}
     memory = bench([people(1)], *runs, "--threads", str(threads))["peak_memory_mib"] * 1.048576
-    figures = {
+    metrics = {
         "fps_one_person": fps[people(1)],
         "fps_four_people": fps[people(4)],
         "fps_empty": fps[people(0)],
         "peak_memory_mb": memory,
         "first_result_ms": statistics.median(start["start_to_first_result_ms"] for start in starts),
     }
-    figures = {name: round(value, 2) for name, value in figures.items()}
+    metrics = {name: round(value, 2) for name, value in metrics.items()}
     document = {"people": main, "sizes": sizes, "one_thread": single, "no_spin": asleep,
                 "starts_ms": [start["start_to_first_result_ms"] for start in starts],
                 "create_ms": statistics.median(start["create_ms"] for start in starts)}  # fmt: skip
-    return document, figures, main["machine"]
+    return document, metrics, main["machine"]

@@ -30,8 +30,8 @@ CROPS = {
     ", crops of all, 256 px": {"person_crops": 2, "person_crop_px": 256},
 }
 KEY_FRAMES = 4
-# Figures of each data set, of which the larger is the better, and what the report calls them.
-FIGURES = {
+# Metrics of each data set, of which the larger is the better, and what the report calls them.
+METRICS = {
     "rendered": {"part": "part", "mask": "mask IoU", "side": "left/right", "gps": "AP by GPS"},
     "photographs": {"recall": "recall at P .9", "mask": "mask IoU", "part": "part", "side": "left/right"},
     "views": {"mask": "mask IoU", "part": "part", "side": "left/right", "gain": "gain"},
@@ -61,7 +61,7 @@ def settings() -> list[Setting]:
 
 
 def measure(pictures: Pictures, bundle: Path, table: object, threshold: float, threads: int = 2) -> list[dict]:
-    """For each setting its name, axis, milliseconds a frame (median over all pictures) and figures by data set."""
+    """For each setting its name, axis, milliseconds a frame (median over all pictures) and metrics by data set."""
     wanted = settings()
     columns = [Column(setting, bundle, threads) for setting in wanted]
     photographs = [photos.read_photo(path) for path in pictures.photographs.photos]
@@ -92,7 +92,7 @@ def rendered_figures(backend: Replay, images: list[LabelledImage], table: object
     tally = Tally(backend.threshold)
     for image in images:
         tally.add(backend, image)
-    found = tally.figures(table)
+    found = tally.metrics(table)
     return {"part": found.part_accuracy, "mask": found.mask_iou, "side": found.left_right, "gps": found.ap_gps}
 
 
@@ -102,7 +102,7 @@ def photograph_figures(backend: Replay, chosen: PhotoSet, images: list[np.ndarra
     tally = photos.Tally(backend.threshold)
     for path, image in zip(chosen.photos, images, strict=True):
         tally.add(path.name, backend.predict(image), PhotoLabels.load(chosen.labels / f"{path.stem}.npz"))
-    found = tally.figures()
+    found = tally.metrics()
     return {"recall": found.recall_at_precision, "mask": found.mask_iou, "part": found.part_at_landmark,
             "side": found.left_right}  # fmt: skip
 
@@ -112,14 +112,14 @@ def view_figures(backend: Replay, pictures: Pictures, images: list[np.ndarray]) 
         return None
     answers = iter([backend.predict(image) for image in images])
     judged, tally = views.judge(lambda _: next(answers), backend.threshold, pictures.moments, pictures.cameras)
-    found = tally.figures()
+    found = tally.metrics()
     return {"mask": found.mask_iou, "part": found.part_at_landmark, "side": found.left_right, "gain": judged.gain}
 
 
 def draw(document: dict) -> plt.Figure:
     """Part accuracy of each data set against run time."""
     rows = document["person_sizes"]
-    known = [name for name in FIGURES if rows[0][name]]
+    known = [name for name in METRICS if rows[0][name]]
     figure, axes = plt.subplots(1, len(known), figsize=(6 * len(known), 5), squeeze=False)
     for axis, name in zip(axes[0], known, strict=True):
         points = [(row["ms"], 1 - row[name]["part"]) for row in rows]
@@ -143,13 +143,13 @@ def draw(document: dict) -> plt.Figure:
 
 def section(rows: list[dict]) -> tuple[str, list]:
     """For the report."""
-    known = [name for name in FIGURES if rows[0][name]]
-    columns = [(name, key) for name in known for key in FIGURES[name]]
-    table = [["setting", "ms", *(f"{name}: {FIGURES[name][key]}" for name, key in columns)]]
+    known = [name for name in METRICS if rows[0][name]]
+    columns = [(name, key) for name in known for key in METRICS[name]]
+    table = [["setting", "ms", *(f"{name}: {METRICS[name][key]}" for name, key in columns)]]
     for row in rows:
-        figures = (row[name][key] for name, key in columns)
-        table.append([row["setting"], f"{row['ms']:.1f}", *("-" if x is None else f"{x:.3f}" for x in figures)])
-    missing = ", ".join(name for name in FIGURES if name not in known)
+        metrics = (row[name][key] for name, key in columns)
+        table.append([row["setting"], f"{row['ms']:.1f}", *("-" if x is None else f"{x:.3f}" for x in metrics)])
+    missing = ", ".join(name for name in METRICS if name not in known)
     return "People at any size", [
         ("people-at-any-size.png", "Input size, crops of people and key frames, on pictures that no training saw."),
         "Rendered people of 640 x 512, a third of them from behind, many tilted, small or in crowds; photographs, "

@@ -28,12 +28,12 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from benchmarks import drawn, gaps
-from benchmarks.drawn.tables import drawn_tables
-from benchmarks.foreseen import motion_error
-from benchmarks.foreseen.dis import Dis
-from benchmarks.foreseen.structure import structure_of
-from benchmarks.gaps import FIRST_START, START_STEP, psnr_db
+from benchmarks import concealment, sampling
+from benchmarks.concealment import FIRST_START, START_STEP, psnr_db
+from benchmarks.prediction_quality import motion_error
+from benchmarks.prediction_quality.dis import Dis
+from benchmarks.prediction_quality.structure import structure_of
+from benchmarks.sampling.tables import sampling_tables
 from export.clips.clip import read_clip
 
 PROGRAM = Path("build/release/benchmarks/native/measure_prediction")
@@ -42,10 +42,11 @@ BUNDLE = Path("sdk/models/prediction-int8")
 SIZE_PX, LARGE_PX = (320, 240), (640, 480)
 FRAMES = 90  # of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
-FIGURES = (
-    "prediction_pictures_a_second", "concealed_wait_p99_ms", "surprise_frames_a_second", *gaps.FIGURES, *drawn.FIGURES
+METRICS = (
+    "prediction_pictures_a_second", "concealed_wait_p99_ms", "novelty_frames_a_second", *concealment.METRICS,
+    *sampling.METRICS,
 )  # fmt: skip
-METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto", "network": "auto, mended"}
+METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto", "network": "auto, refined"}
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def measure(
     photos: Path = Path(".data/photos/clip"),
     threads: int = 2,
 ) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """The document, the figures of FIGURES, and why one is missing.
+    """The document, the metrics of METRICS, and why one is missing.
 
     Raises FileNotFoundError where the program was not built, subprocess.SubprocessError where it fails.
     """
@@ -87,39 +88,39 @@ def measure(
         paths = sorted(clips.glob("clip-*.npz"))[: 3 if quick else 24]
         document["motion_error_px"] = motion_error.measure(paths)
     surprise = frames_a_second(BUNDLE, threads, 60 if quick else 200)
-    document["surprise"] = surprise
-    figures = {
+    document["novelty"] = surprise
+    metrics = {
         "concealed_wait_p99_ms": waits["wait_ms"]["p99"],
-        "surprise_frames_a_second": surprise["frames_a_second"],
+        "novelty_frames_a_second": surprise["frames_a_second"],
     }
     missing = {}
     if speed:
-        figures["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
+        metrics["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
     else:
         missing["prediction_pictures_a_second"] = "; ".join(absent)
-    bridged = gaps.measure(films, threads)
-    document["gaps"] = {name: rows.tolist() for name, rows in bridged.items()}
+    bridged = concealment.measure(films, threads)
+    document["concealment"] = {name: rows.tolist() for name, rows in bridged.items()}
     if bridged:
-        figures |= gaps.figures_of(bridged)
+        metrics |= concealment.metrics_of(bridged)
     else:
-        missing |= dict.fromkeys(gaps.FIGURES, "; ".join(absent))
+        missing |= dict.fromkeys(concealment.METRICS, "; ".join(absent))
     if pushing:
-        document["drawn"], found = measure_drawn(quick, clips, threads)
-        figures |= found
+        document["sampling"], found = measure_sampling(quick, clips, threads)
+        metrics |= found
     else:
-        missing |= dict.fromkeys(drawn.FIGURES, "; ".join(absent))
-    return document, figures, missing
+        missing |= dict.fromkeys(sampling.METRICS, "; ".join(absent))
+    return document, metrics, missing
 
 
-def measure_drawn(quick: bool, folder: Path, threads: int) -> tuple[dict, dict[str, float]]:
-    """Of the validation clips of a folder DATA/SET/val: the document, and its figures."""
-    from benchmarks.drawn import measure  # torch: not before it is needed
+def measure_sampling(quick: bool, folder: Path, threads: int) -> tuple[dict, dict[str, float]]:
+    """Of the validation clips of a folder DATA/SET/val: the document, and its metrics."""
+    from benchmarks.sampling import measure  # torch: not before it is needed
 
     data, kind = folder.parent.parent, folder.parent.name
     clips = measure.clips_of(data, kind, 2 if quick else None)
-    document, figures = measure.measure_pictures(clips, measure.real_clips(data, kind, len(clips)), BUNDLE)
+    document, metrics = measure.measure_pictures(clips, measure.real_clips(data, kind, len(clips)), BUNDLE)
     document["times_ms"], of_times = measure.measure_times(clips, BUNDLE, threads)
-    return document, figures | of_times
+    return document, metrics | of_times
 
 
 def run(words: Sequence[str], given: bytes = b"") -> str:
@@ -305,20 +306,20 @@ def section(measured: dict) -> tuple[str, list]:
         f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
         f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
     )
-    if measured.get("gaps"):  # a report measured before has none
+    if measured.get("concealment"):  # a report measured before has none
         parts.append(
             "Gaps of up to 300 ms bridged, PSNR in dB over their frames: the last frame repeated / what is predicted."
         )
-        parts.append(gaps.table_of({name: np.array(rows) for name, rows in measured["gaps"].items()}))
-    surprise = measured["surprise"]
+        parts.append(concealment.table_of({name: np.array(rows) for name, rows in measured["concealment"].items()}))
+    surprise = measured["novelty"]
     parts.append(
         f"Surprise with its map, frames of 640 x 480: {surprise['frames_a_second']:.0f} a second, "
         f"{surprise['cpu_ms']:.1f} ms of processor time a frame (squeezing {surprise['resize_ms']:.1f}, network "
         f"{surprise['network_ms']:.1f}, nearest entries {surprise['nearest_ms']:.1f} ms). How well it finds events: "
         "`python -m benchmarks.surprise`."
     )
-    if measured.get("drawn"):
-        parts += drawn_tables(measured["drawn"])
+    if measured.get("sampling"):
+        parts += sampling_tables(measured["sampling"])
     parts += [f"Not measured: {'; '.join(measured['missing'])}."] if measured["missing"] else []
     return "Prediction", parts
 
@@ -335,9 +336,9 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--quick", action="store_true")
     options = parser.parse_args(argv)
-    document, figures, missing = measure(options.quick, options.clips, options.photos, options.threads)
+    document, metrics, missing = measure(options.quick, options.clips, options.photos, options.threads)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(json.dumps(document | {"figures": figures}, indent=1) + "\n")
+    options.out.write_text(json.dumps(document | {"metrics": metrics}, indent=1) + "\n")
     console = Console(width=200)
     head, *rows = table_of(document["rows"], document["sets"])
     shown = Table(*head)
@@ -346,8 +347,8 @@ def main(argv: list[str] | None = None) -> int:
     console.print(shown)
     for part in section(document)[1][2:]:
         console.print(part if isinstance(part, str) else "\n".join("   ".join(row) for row in part))
-    for name in FIGURES:
-        console.print(f"{name}: {figures[name]:.2f}" if name in figures else f"{name}: not measured, {missing[name]}")
+    for name in METRICS:
+        console.print(f"{name}: {metrics[name]:.2f}" if name in metrics else f"{name}: not measured, {missing[name]}")
     console.print(f"Written: {options.out}")
     return 0
 

@@ -11,10 +11,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, frame_budget, person_sizes, prediction, start, window
-from benchmarks.edges import pictures as edge_pictures
+from benchmarks import camera_section, frame_budget, person_sizes, prediction, provenance, startup, ui_latency
+from benchmarks.edges import plots as edge_pictures
 from benchmarks.edges import section as edge_section
-from benchmarks.scenes import pictures as scene_pictures
+from benchmarks.scenes import plots as scene_pictures
 from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
 
@@ -106,7 +106,7 @@ def stages(document: dict) -> plt.Figure:
 
 
 def runtimes(document: dict) -> plt.Figure:
-    rows = [row for row in document["peers"]["runtimes"] if row["total_ms"]]
+    rows = [row for row in document["runtimes"]["runtimes"] if row["total_ms"]]
     figure, axis = plt.subplots(figsize=(10, 0.6 + 0.5 * len(rows)))
     for k, row in enumerate(rows):
         left = 0.0
@@ -126,7 +126,7 @@ PICTURES = {
     "people-at-any-size.png": (person_sizes.draw, "person_sizes"),
     "scaling.png": (scaling, "frames"),
     "stages.png": (stages, "frames"),
-    "runtimes.png": (runtimes, "peers"),
+    "runtimes.png": (runtimes, "runtimes"),
 }
 
 Section = tuple[str, list]  # title, and what follows: a text, a picture's (name, caption), or a table as lists of cells
@@ -139,7 +139,7 @@ def text_sections(document: dict) -> list[Section]:
     )
     sections = [
         ("Maquette: how fast, how large, how exact", [intro, *circumstances(document)]),
-        gates_section(document),
+        targets_section(document),
     ]
     for name, section in SECTIONS.items():
         if name in document:
@@ -151,9 +151,9 @@ def sweep_section(sweep: list[dict]) -> Section:
     rows = [["setting", "ms", "1 - AP by GPS", "surface error, cm", "box AP", "part accuracy", "front"]]
     front = set(pareto([(row["ms"], row["error"]) for row in sweep]))
     for k, row in enumerate(sweep):
-        figures = [f"{row['ms']:.1f}", f"{row['error']:.3f}", f"{row['error_cm']:.1f}", f"{row['box_ap']:.3f}"]
-        figures.append(f"{row['part_accuracy']:.3f}")
-        rows.append([row["setting"], *figures, "●" if k in front else ""])
+        metrics = [f"{row['ms']:.1f}", f"{row['error']:.3f}", f"{row['error_cm']:.1f}", f"{row['box_ap']:.3f}"]
+        metrics.append(f"{row['part_accuracy']:.3f}")
+        rows.append([row["setting"], *metrics, "●" if k in front else ""])
     return "Error against run time", [
         ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
         "Rendered people that no training saw; all settings measured alternately on the same pictures. AP by GPS: "
@@ -180,17 +180,17 @@ def frames_section(frames: dict) -> Section:
     ]
 
 
-def peers_section(peers: dict) -> Section:
-    graphs = list(peers["roofline"]["graphs"])
+def runtimes_section(measured: dict) -> Section:
+    graphs = list(measured["roofline"]["graphs"])
     rows = [["runtime", *graphs, "all, ms", "Maquette int8 by it"]]
-    for row in peers["runtimes"]:
+    for row in measured["runtimes"]:
         name = f"{row['name']} {row['version']} {row['precision']}"
         if row["total_ms"] is None:
             rows.append([name, row["missing"], *[""] * (len(graphs) + 1)])
         else:
             rows.append([name, *(f"{row['ms'][g]:.2f}" for g in graphs), f"{row['total_ms']:.2f}",
                          f"{row['ours_int8_ratio']:.2f}"])  # fmt: skip
-    line = peers["roofline"]
+    line = measured["roofline"]
     line_rows = [["graph", "million multiply-adds", "of these int8", "min. ms", "fraction reached"]]
     for name, graph in line["graphs"].items():
         line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
@@ -219,9 +219,9 @@ SECTIONS = {
     "person_sizes": person_sizes.section,
     "frame_budget": frame_budget.section,
     "frames": frames_section,
-    "start": start.section,
-    "window": window.section,
-    "peers": peers_section,
+    "startup": startup.section,
+    "ui_latency": ui_latency.section,
+    "runtimes": runtimes_section,
     "agreement": agreement_section,
     "cameras": camera_section.section,
     "scenes": scene_section.section,
@@ -231,12 +231,12 @@ SECTIONS = {
 
 
 def warnings_of(document: dict) -> set[str]:
-    """Why figures of the measured parts are unreliable, as the parts say."""
+    """Why metrics of the measured parts are unreliable, as the parts say."""
     frames = document.get("frames", {})
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
     found = {text for run in runs for text in run["warnings"]}
     found |= {text for run in runs for case in run["cases"] for text in case["warnings"]}
-    others = ("start", "window", "cameras", "scenes", "edges", "prediction")
+    others = ("startup", "ui_latency", "cameras", "scenes", "edges", "prediction")
     return found.union(*(document[name]["warnings"] for name in others if name in document))
 
 
@@ -245,19 +245,20 @@ def circumstances(document: dict) -> list[str]:
     return [
         f"Measured on: {machine['processor']}, {machine['cores']} cores, {machine['memory_mib'] / 1024:.0f} GiB, "
         f"{machine['system']}; instruction sets: {', '.join(machine['instruction_sets'])}.",
-        *(["A quick run, to see that it works: do not quote it."] if document["quick"] else []),
+        provenance.sentence(document.get("measured", {})),
+        *(["This is a quick run, a smoke test. Do not quote it."] if document["quick"] else []),
         *([f"Warnings of the measurement: {'; '.join(sorted(warnings))}."] if warnings else []),
     ]
 
 
-def gates_section(document: dict) -> Section:
-    rows = [["what", "figure", "gate", "stretch", "state"]]
-    for gate in document["gates"]:
-        value = "" if gate["value"] is None else f"{gate['value']:.4g}"
-        why = f": {gate['why']}" if gate["why"] else ""
-        rows.append([gate["says"], value, gate["gate"], gate["stretch"], gate["state"] + why])
-    tried = [f"Missed: {gate['says']}. {gate['tried']}" for gate in document["gates"] if gate["tried"]]
-    return "Gates", [rows, *tried]
+def targets_section(document: dict) -> Section:
+    rows = [["metric", "value", "threshold", "goal", "state"]]
+    for target in document["targets"]:
+        value = "" if target["value"] is None else f"{target['value']:.4g}"
+        why = f": {target['why']}" if target["why"] else ""
+        rows.append([target["description"], value, target["threshold"], target["goal"], target["state"] + why])
+    tried = [f"Missed: {target['description']}. {target['tried']}" for target in document["targets"] if target["tried"]]
+    return "Targets", [rows, *tried]
 
 
 def markdown(sections: list[Section]) -> str:
@@ -280,7 +281,7 @@ STYLE = """body { font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin
 img { max-width: 100%; } table { border-collapse: collapse; font-size: 0.85rem; margin: 1rem 0; }
 td, th { border-bottom: 1px solid #ddd; padding: 0.2rem 0.6rem; text-align: right; }
 td:first-child, th:first-child { text-align: left; } figcaption { color: #555; font-size: 0.85rem; }
-.missed { color: #b00020; font-weight: bold; } .met, .stretch { color: #176f2c; }"""
+.missed { color: #b00020; font-weight: bold; } .met, .goal { color: #176f2c; }"""
 
 
 def page(sections: list[Section], folder: Path) -> str:
@@ -307,7 +308,7 @@ def table(rows: list[list[str]]) -> str:
     lines = ["<tr>" + "".join(f"<th>{html.escape(cell)}</th>" for cell in head) + "</tr>"]
     for row in rest:
         state = row[-1].split(":")[0]
-        mark = f' class="{state}"' if state in ("met", "missed", "stretch") else ""
+        mark = f' class="{state}"' if state in ("met", "missed", "goal") else ""
         cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row[:-1])
         lines.append(f"<tr>{cells}<td{mark}>{html.escape(row[-1])}</td></tr>")
     return "<table>" + "\n".join(lines) + "</table>"

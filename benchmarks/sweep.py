@@ -153,16 +153,16 @@ def measure(
         tally = Tally(threshold)
         for image in images:
             tally.add(backend, image)
-        figures = tally.figures(table)
+        metrics = tally.metrics(table)
         measured.append(
             Measured(
                 setting=column.setting,
                 ms=round(statistics.median(column.ms), 3),
                 ms_p90=round(float(np.percentile(column.ms, 90)), 3),
-                error=round(1 - figures.ap_gps, 4),
-                error_cm=round(figures.error_cm_painted, 2),
-                box_ap=round(figures.ap_box, 4),
-                part_accuracy=round(figures.part_accuracy, 4),
+                error=round(1 - metrics.ap_gps, 4),
+                error_cm=round(metrics.error_cm_painted, 2),
+                box_ap=round(metrics.ap_box, 4),
+                part_accuracy=round(metrics.part_accuracy, 4),
             )
         )
     return measured

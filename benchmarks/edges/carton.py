@@ -38,7 +38,7 @@ MARKS = {
     "026.jpg": {"A": (203, 199), "B": (474, 281), "C": (457, 347), "D": (208, 264), "E": (297, 113), "F": (514, 168)},
 }
 EDGES = ("AB", "BC", "CD", "DA", "AE", "BF", "EF", "FG", "CG", "DH", "EH", "GH")  # G, H: behind C, D
-FIGURES = ("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg")
+METRICS = ("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg")
 FOUND_PX = 3.0  # half of a found edge has a curve so near
 STEPS = 200  # places on an edge
 SAME_DEG = 20.0  # a line along an edge differs by less from it
@@ -141,11 +141,11 @@ def found_in(bundle: Path) -> tuple[dict | None, str]:
         return None, error.stderr.strip()
 
 
-def figures_from(found: dict | None) -> dict[str, float]:
-    """Those of FIGURES that are known."""
+def metrics_from(found: dict | None) -> dict[str, float]:
+    """Those of METRICS that are known."""
     if found is None:
         return {}
-    values = dict(zip(FIGURES, (found["found"], found["median_px"], found["angle_deg"]), strict=True))
+    values = dict(zip(METRICS, (found["found"], found["median_px"], found["angle_deg"]), strict=True))
     return {name: float(value) for name, value in values.items() if value is not None}
 
 

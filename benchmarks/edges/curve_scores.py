@@ -21,15 +21,15 @@ def view_score(found: Curves, view: View) -> dict[str, float]:
     focal_px = view.camera.focal_px
     true = [polyline(c) for c in view.curves["curves"]]
     sure = [polyline(c) for c in view.curves["curves"] if c["sure"]]
-    figures = score(found.points, sure, focal_px)
-    figures["precision"] = score(found.points, true, focal_px)["precision"]
+    metrics = score(found.points, sure, focal_px)
+    metrics["precision"] = score(found.points, true, focal_px)["precision"]
     lines = [polyline(c) for c in view.curves["curves"] if c["type"] == "line"]
-    return with_f_score(figures) | {"angle_deg": line_angle_deg(found, lines, focal_px)}
+    return with_f_score(metrics) | {"angle_deg": line_angle_deg(found, lines, focal_px)}
 
 
-def with_f_score(figures: dict[str, float]) -> dict[str, float]:
-    both = figures["precision"] + figures["recall"]
-    return figures | {"f_score": 2 * figures["precision"] * figures["recall"] / both if both > 0 else 0.0}
+def with_f_score(metrics: dict[str, float]) -> dict[str, float]:
+    both = metrics["precision"] + metrics["recall"]
+    return metrics | {"f_score": 2 * metrics["precision"] * metrics["recall"] / both if both > 0 else 0.0}
 
 
 def line_angle_deg(found: Curves, true: Sequence[np.ndarray], focal_px: float) -> float:

@@ -8,25 +8,21 @@ from __future__ import annotations
 import json
 import statistics
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.edges import planes
 from benchmarks.edges.curve_scores import line_angle_deg, view_score, with_f_score
-from benchmarks.edges.edges_api import Curves, Edges, Pinhole, depth_frames
+from benchmarks.edges.edges_api import Edges, depth_frames
 from benchmarks.edges.methods import SHIPPED
-from benchmarks.edges.planes import Planes
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.speed import SCENES, SMALL_PX
 from benchmarks.edges.views import View
 from export.edges.curve_metrics import score
 
 TRUTH = Path("build/release/benchmarks/native/print_solids_truth")
-TUNING_VIEWS = 16  # validation views that the planes' threshold is chosen on
-PLANES = "planes found and intersected"
 NOISES = {"none": "clean", "tof": "tof", "stereo": "stereo"}  # of stub:solids, and the level of each
 BOX_SEEDS, BOX_FRAMES, STEADY_FRAMES = 20, 5, 100
 SCENE_FRAMES = 20
@@ -41,38 +37,23 @@ def mean_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
     return found
 
 
-def tuned_planes(val: Sequence[View]) -> dict[str, Planes]:
-    """By level; none where OpenCV has no planes."""
-    if planes.missing():
-        return {}
-    chosen = with_curves(val)
-    chosen = chosen[:: max(1, len(chosen) // TUNING_VIEWS)]
-    return {level: planes.tuned(chosen, [view.seen(level) for view in chosen]) for level in LEVELS if chosen}
-
-
 def with_curves(views: Sequence[View]) -> list[View]:
     """Those with a curve that is surely sharp."""
     return [view for view in views if any(c["sure"] for c in (view.curves or {"curves": []})["curves"])]
 
 
-def measure_solids(views: Sequence[View], edges: Edges, rivals: Mapping[str, Planes]) -> list[dict]:
-    """Rows by sensor and way, means over views with a curve that is surely sharp."""
+def measure_solids(views: Sequence[View], edges: Edges) -> list[dict]:
+    """Returns a row for each sensor: means over views with a curve that is certainly sharp."""
     rows, wanted = [], with_curves(views)
     for level in tqdm(LEVELS if wanted else (), desc="edges: curves", unit="level", disable=None):
-        for way, find in ways_of(edges, rivals.get(level)).items():
-            scores, ms = [], []
-            for view in wanted:
-                found = find(view.seen(level), view.camera)
-                scores.append(view_score(found, view))
-                ms.append(found.curves_ms)
-            figures = {"views": len(scores), **mean_of(scores), "ms": statistics.median(ms)}
-            rows.append({"level": level, "way": way, **figures})
+        scores, ms = [], []
+        for view in wanted:
+            found = edges.run(view.seen(level), view.camera, curves=True).curves
+            scores.append(view_score(found, view))
+            ms.append(found.curves_ms)
+        metrics = {"views": len(scores), **mean_of(scores), "ms": statistics.median(ms)}
+        rows.append({"level": level, "way": SHIPPED, **metrics})
     return rows
-
-
-def ways_of(edges: Edges, rival: Planes | None) -> dict[str, Callable[[np.ndarray, Pinhole], Curves]]:
-    found = {SHIPPED: lambda depth, camera: edges.run(depth, camera, curves=True).curves}
-    return found | ({PLANES: rival.find} if rival else {})
 
 
 def truth_of(scene: str, seed: int, frames: int) -> dict:
@@ -101,8 +82,8 @@ def measure_scenes(bundle: Path, threads: int, frames: int) -> list[dict]:
                     if not number:  # prepares the network
                         continue
                     lines = [np.array(line) for line in truth[number]]
-                    figures = with_f_score(score(result.curves.points, lines, camera.focal_px))
-                    scores.append(figures | {"angle_deg": line_angle_deg(result.curves, lines, camera.focal_px)})
+                    metrics = with_f_score(score(result.curves.points, lines, camera.focal_px))
+                    scores.append(metrics | {"angle_deg": line_angle_deg(result.curves, lines, camera.focal_px)})
                     ms["field"].append(result.stats.total_ms)
                     ms["curves"].append(result.curves.curves_ms)
                     ms["boxes"].append(result.curves.boxes_ms)
@@ -113,58 +94,59 @@ def measure_scenes(bundle: Path, threads: int, frames: int) -> list[dict]:
     return rows
 
 
-def measure_boxes(
-    edges: Edges, rivals: Mapping[str, Planes], seeds: int, frames: int, steady_frames: int
-) -> list[dict]:
-    """Rows by noise and way: of `seeds` cartons of stub:solids?scene=box, seen in `frames` frames each, how many frames
-    have a box, the median error of its sides in mm, and the largest standard deviation of a side of one carton while
-    the camera turns around it for `steady_frames`."""
+def measure_boxes(edges: Edges, seeds: int, frames: int, steady_frames: int) -> list[dict]:
+    """Returns a row for each noise of `seeds` boxes of stub:solids?scene=box, `frames` frames each: the fraction of
+    frames with a box, the median error of its sides in mm, and the largest standard deviation of a side of one box
+    while the camera orbits it for `steady_frames`."""
     rows = []
     for noise in tqdm(NOISES, desc="edges: boxes", unit="noise", disable=None):
-        for way, find in ways_of(edges, rivals.get(NOISES[noise])).items():
-            errors, found, looked = [], 0, 0
-            for seed in range(1, seeds + 1):
-                true = np.sort(truth_of("box", seed, 0)["cartons_m"][0])[::-1]
-                for depth, camera in frames_of("box", noise, seed, frames):
-                    boxes = find(depth, camera).boxes_m
-                    looked += 1
-                    found += bool(boxes)
-                    errors += list(1000 * np.abs(np.array(boxes[0]) - true)) if boxes else []
-            each = [find(depth, camera).boxes_m for depth, camera in frames_of("box", noise, 1, steady_frames)]
-            sides = np.array([boxes[0] for boxes in each if boxes])
-            rows.append({"noise": noise, "way": way, "frames": looked, "with_box": found / looked,
-                         "median_mm": float(np.median(errors)) if errors else None,
-                         "p90_mm": float(np.percentile(errors, 90)) if errors else None,
-                         "steady_frames": len(sides), "turned_frames": steady_frames,
-                         "deviation_mm": float(1000 * sides.std(0).max()) if len(sides) > 1 else None})  # fmt: skip
+        errors, found, looked = [], 0, 0
+        for seed in range(1, seeds + 1):
+            true = np.sort(truth_of("box", seed, 0)["cartons_m"][0])[::-1]
+            for boxes in _boxes_of(edges, noise, seed, frames):
+                looked += 1
+                found += bool(boxes)
+                errors += list(1000 * np.abs(np.array(boxes[0]) - true)) if boxes else []
+        sides = np.array([boxes[0] for boxes in _boxes_of(edges, noise, 1, steady_frames) if boxes])
+        rows.append({"noise": noise, "way": SHIPPED, "frames": looked, "with_box": found / looked,
+                     "median_mm": float(np.median(errors)) if errors else None,
+                     "p90_mm": float(np.percentile(errors, 90)) if errors else None,
+                     "steady_frames": len(sides), "turned_frames": steady_frames,
+                     "deviation_mm": float(1000 * sides.std(0).max()) if len(sides) > 1 else None})  # fmt: skip
     return rows
+
+
+def _boxes_of(edges: Edges, noise: str, seed: int, frames: int) -> list[list[tuple[float, float, float]]]:
+    """Returns the sides in metres of all boxes in each frame, the largest box first."""
+    return [edges.run(depth, camera, curves=True).curves.boxes_m
+            for depth, camera in frames_of("box", noise, seed, frames)]  # fmt: skip
 
 
 def _frames_with_box(row: Mapping) -> str:
     return f"a box was found in {row['steady_frames']} of {row['turned_frames']} frames"
 
 
-def scene_figures_from(scenes: Sequence[Mapping]) -> dict[str, float]:
-    """Those that are gates."""
+def scene_metrics_from(scenes: Sequence[Mapping]) -> dict[str, float]:
+    """Those that are targets."""
     return {f"edges_fps_{row['scene']}": 1000 / row["ms"] for row in scenes if row["noise"] == "tof"}
 
 
-def figures_from(solids: Sequence[Mapping], boxes: Sequence[Mapping]) -> tuple[dict[str, float], dict[str, str]]:
-    """Those that are gates, and why others are missing."""
-    figures = {f"edges_curves_{row['level']}": row["f_score"] for row in solids if row["way"] == SHIPPED}
+def metrics_from(solids: Sequence[Mapping], boxes: Sequence[Mapping]) -> tuple[dict[str, float], dict[str, str]]:
+    """Those that are targets, and why others are missing."""
+    metrics = {f"edges_curves_{row['level']}": row["f_score"] for row in solids if row["way"] == SHIPPED}
     missing, by_noise = {}, {row["noise"]: row for row in boxes if row["way"] == SHIPPED}
     for noise in ("tof", "stereo"):
         row, name = by_noise[noise], f"edges_box_mm_{noise}"
         if row["median_mm"] is None:
             missing[name] = f"no box was found in {row['frames']} frames"
         else:
-            figures[name] = row["median_mm"]
+            metrics[name] = row["median_mm"]
     row = by_noise["tof"]
     if row["deviation_mm"] is None:
         missing["edges_box_deviation_mm"] = _frames_with_box(row)
     else:
-        figures["edges_box_deviation_mm"] = row["deviation_mm"]
+        metrics["edges_box_deviation_mm"] = row["deviation_mm"]
     for level in LEVELS:
-        if f"edges_curves_{level}" not in figures:
+        if f"edges_curves_{level}" not in metrics:
             missing[f"edges_curves_{level}"] = "the test views have no curves stored"
-    return figures, missing
+    return metrics, missing

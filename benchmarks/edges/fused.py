@@ -31,7 +31,7 @@ from export.solids import sensors
 if TYPE_CHECKING:
     from export.solids.multiview import MultiView
 
-FIGURES, TIME_FIGURE = ("edges_fusion_memory_mb", "edges_fusion_rmse"), "edges_fusion_s"
+METRICS, TIME_METRIC = ("edges_fusion_memory_mb", "edges_fusion_rmse"), "edges_fusion_s"
 SOLIDS, QUICK_SOLIDS = 6, 2
 VIEWS, TIMED_VIEWS = 12, 24
 TIMED_LEVEL = "tof"
@@ -115,8 +115,8 @@ def world_score(found: Sequence[np.ndarray], true: Sequence[np.ndarray], r_m: fl
     """export.edges.curve_metrics.score of polylines [n, 3] in the world, where r is the same everywhere."""
     # Put so far away from a camera with as long a focal length that depth, and so r, hardly varies.
     away = np.array([0, 0, FAR])
-    figures = score([line / r_m + away for line in found], [line / r_m + away for line in true], FAR)
-    return {key: figures[key] for key in ("precision", "recall", "f_score")}
+    metrics = score([line / r_m + away for line in found], [line / r_m + away for line in true], FAR)
+    return {key: metrics[key] for key in ("precision", "recall", "f_score")}
 
 
 def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[tuple[int, MultiView]]:
@@ -198,17 +198,17 @@ def found_by(measuring: Callable[[], dict]) -> tuple[dict | None, str]:
         return None, error.stderr.strip().splitlines()[-1]
 
 
-def figures_from(found: Mapping | None) -> dict[str, float]:
-    """Those of FIGURES and TIME_FIGURE that `found` says: the seconds of the median solid, megabytes of MANY points in
+def metrics_from(found: Mapping | None) -> dict[str, float]:
+    """Those of METRICS and TIME_METRIC that `found` says: the seconds of the median solid, megabytes of MANY points in
     proportion to those that there were, and the ratio of the level that gains the least."""
     if found is None:
         return {}
-    figures = {}
+    metrics = {}
     if found.get("times"):
-        figures[TIME_FIGURE] = statistics.median(row["s"] for row in found["times"])
+        metrics[TIME_METRIC] = statistics.median(row["s"] for row in found["times"])
     memory = found.get("memory")
     if memory and memory["points"]:
-        figures["edges_fusion_memory_mb"] = memory["memory_mb"] * MANY / memory["points"]
+        metrics["edges_fusion_memory_mb"] = memory["memory_mb"] * MANY / memory["points"]
     if found.get("errors"):
-        figures["edges_fusion_rmse"] = max(row["ratio"] for row in found["errors"])
-    return figures
+        metrics["edges_fusion_rmse"] = max(row["ratio"] for row in found["errors"])
+    return metrics

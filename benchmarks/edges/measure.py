@@ -5,7 +5,7 @@
     python -m benchmarks --only edges --edge-parts fields curves    an hour, which a busy machine does not distort
     python -m benchmarks --only edges --edge-parts times            minutes, for a quiet one
 
-Figures come from whole views of solids whose families neither training nor the choice of thresholds saw. A gate that
+Metrics come from whole views of solids whose families neither training nor the choice of thresholds saw. A target that
 could not be measured is said to be so, with the reason.
 """
 
@@ -21,19 +21,16 @@ from pathlib import Path
 
 from benchmarks.edges import (
     carton,
+    curved_false_positives,
     curves,
     fused,
-    pictures,
-    planes,
+    plots,
     quality,
-    round_scans,
-    sensitivity,
     speed,
     true_fields,
-    voronoi,
 )  # fmt: skip
 from benchmarks.edges.edges_api import Edges
-from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_rivals
+from benchmarks.edges.methods import FLOAT, SHIPPED, Networks, opened, tuned_baselines
 from benchmarks.edges.views import View, read_views
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 from export.bundle import BundleInfo
@@ -52,22 +49,22 @@ QUICK_VIEWS, QUICK_FRAMES = 8, 4
 CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
 
 PARTS = ("fields", "curves", "times")
-FIELD_FIGURES = (
-    *(f"edges_rmse_{level}" for level in quality.LEVELS), "edges_rmse_by_rival", "edges_rmse_by_solids",
+FIELD_METRICS = (
+    *(f"edges_rmse_{level}" for level in quality.LEVELS), "edges_rmse_by_baseline", "edges_rmse_by_solids",
     "edges_recall_r_clean", *(f"edges_recall_4r_{level}" for level in quality.LEVELS), "edges_int8_rmse_percent",
     "edges_int8_same_side", "edges_bundle_mb", "edges_memory_mb", "edges_allocations",
     "edges_own_allocations",
 )  # fmt: skip
-CURVE_FIGURES = (
-    true_fields.FIGURE, *(f"edges_curves_{level}" for level in quality.LEVELS), "edges_box_mm_tof",
+CURVE_METRICS = (
+    true_fields.METRIC, *(f"edges_curves_{level}" for level in quality.LEVELS), "edges_box_mm_tof",
     "edges_box_mm_stereo", "edges_box_deviation_mm",
 )  # fmt: skip
-FIGURES_OF = {
-    "fields": (*FIELD_FIGURES, round_scans.FIGURE),
-    "curves": (*CURVE_FIGURES, *fused.FIGURES, *carton.FIGURES),
-    "times": ("edges_fps_320", "edges_fps_640", *(f"edges_fps_{scene}" for scene in speed.SCENES), fused.TIME_FIGURE),
+METRICS_OF = {
+    "fields": (*FIELD_METRICS, curved_false_positives.METRIC),
+    "curves": (*CURVE_METRICS, *fused.METRICS, *carton.METRICS),
+    "times": ("edges_fps_320", "edges_fps_640", *(f"edges_fps_{scene}" for scene in speed.SCENES), fused.TIME_METRIC),
 }
-FIGURES = tuple(figure for figures in FIGURES_OF.values() for figure in figures)
+METRICS = tuple(figure for metrics in METRICS_OF.values() for figure in metrics)
 
 
 @dataclass(frozen=True)
@@ -87,10 +84,10 @@ class Sources:
 
 @dataclass
 class Found:
-    """Of one of PARTS: its entries of the document, the figures that are gates, and why others are missing."""
+    """Of one of PARTS: its entries of the document, the metrics that are targets, and why others are missing."""
 
     document: dict
-    figures: dict[str, float]
+    metrics: dict[str, float]
     missing: dict[str, str]
 
 
@@ -155,12 +152,12 @@ def networks_of(given: Sources, folder: Path) -> Networks:
 def measure(
     given: Sources, folder: Path, threads: int, quick: bool, parts: Sequence[str] = PARTS, last: Mapping | None = None
 ) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the figures that are gates, and why others are missing. last: the document of a run before,
+    """What was measured, the metrics that are targets, and why others are missing. last: the document of a run before,
     from which parts come that are not measured. The sheet of pictures is written into `folder`: pictures are in no
     JSON."""
     document, networks = dict(last or {}), networks_of(given, folder)
     document.setdefault("warnings_of", {})
-    figures, missing = {}, {}
+    metrics, missing = {}, {}
     measurements = {"fields": measure_fields, "curves": measure_curves, "times": measure_times}
     for part, measuring in measurements.items():
         if part not in parts:
@@ -174,10 +171,10 @@ def measure(
             warnings.append(f"other processes used {fraction:.0%} of the CPU (edges, {part})")
         document |= found.document
         document["warnings_of"] = document["warnings_of"] | {part: warnings}
-        figures |= {name: round(value, 4) for name, value in found.figures.items()}
-        missing |= {name: why for name, why in found.missing.items() if name not in found.figures}
+        metrics |= {name: round(value, 4) for name, value in found.metrics.items()}
+        missing |= {name: why for name, why in found.missing.items() if name not in found.metrics}
     document["warnings"] = [text for warnings in document["warnings_of"].values() for text in warnings]
-    return document, figures, missing
+    return document, metrics, missing
 
 
 def views_of(given: Sources, quick: bool) -> tuple[list[View], list[View]]:
@@ -200,49 +197,45 @@ def measure_fields(given: Sources, networks: Networks, folder: Path, threads: in
         errors = quality.measure(val, test, ways, levels[:1] if quick else levels)
         sets = {name: quality.of_set(read_views(path, WIDTH_PX, view_limit(given, quick)), ways[SHIPPED],
                                      cuts_of(errors.cuts)) for name, path in given.sets.items()}  # fmt: skip
-        of_voronoi = voronoi.measure(val, test, ways[SHIPPED], cuts_of(errors.cuts))
-    of_round, why_no_round = round_scans.found_in(given.bundle, threads)
+    of_round, why_no_round = curved_false_positives.found_in(given.bundle, threads)
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "round": of_round,
-        "voronoi": of_voronoi,
         "missing": {**networks.missing, **errors.missing, **programs_missing()},
-        "sheet": pictures.write_sheet(errors.shown, folder).name,
+        "sheet": plots.write_sheet(errors.shown, folder).name,
     }  # fmt: skip
-    figures = quality.figures_from(errors.rows, errors.agreement)
-    figures["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
-    figures |= speed.stream_cost(given.bundle, threads, folder) | round_scans.figures_from(of_round)
-    missing = {round_scans.FIGURE: why_no_round}
+    metrics = quality.metrics_from(errors.rows, errors.agreement)
+    metrics["edges_bundle_mb"] = sum(path.stat().st_size for path in given.bundle.iterdir()) / 1e6
+    metrics |= speed.stream_cost(given.bundle, threads, folder) | curved_false_positives.metrics_from(of_round)
+    missing = {curved_false_positives.METRIC: why_no_round}
     missing |= dict.fromkeys(("edges_int8_rmse_percent", "edges_int8_same_side"), networks.missing.get(FLOAT, ""))
     if CAD_PARTS in sets:
-        figures["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
+        metrics["edges_rmse_by_solids"] = set_ratio(sets[CAD_PARTS], errors.rows)
     else:
         missing["edges_rmse_by_solids"] = f"no set of real parts: --edge-sets {CAD_PARTS}=DIR"
-    return Found(document, figures, missing)
+    return Found(document, metrics, missing)
 
 
 def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quick: bool) -> Found:
     """Errors of curves and boxes, of one view and of fused ones: what a busy machine does not distort."""
-    val, test = views_of(given, quick)
+    _, test = views_of(given, quick)
     amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
-    tuned = curves.tuned_planes(val)
     some = test[:: max(1, len(test) // CURVE_VIEWS)]
     with Edges(given.bundle, threads) as shipped:
-        of_solids = curves.measure_solids(some, shipped, tuned)
-        boxes = curves.measure_boxes(shipped, tuned, *amounts)
-        of_parameters = sensitivity.measure(val, shipped)
+        of_solids = curves.measure_solids(some, shipped)
+        boxes = curves.measure_boxes(shipped, *amounts)
     of_true, why_no_true = true_fields.found_in(some, folder)
     of_carton, why_no_carton = carton.found_in(given.bundle)
     of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure(given.bundle, threads, quick, folder))
     document = {"curves": of_solids, "curves_of_true_fields": of_true, "boxes": boxes, "fusion": of_fusion,
-                "carton": of_carton, "sensitivity": of_parameters}  # fmt: skip
-    figures, missing = curves.figures_from(of_solids, boxes)
-    figures |= true_fields.figures_from(of_true)
-    figures |= fused.figures_from(of_fusion) | carton.figures_from(of_carton)
-    missing |= dict.fromkeys(carton.FIGURES, why_no_carton or "too little of the carton was found")
-    missing |= dict.fromkeys(fused.FIGURES, why_no_fusion or "no solid could be made")
-    missing[true_fields.FIGURE] = why_no_true
-    return Found(document, figures, missing)
+                "carton": of_carton}  # fmt: skip
+    metrics, missing = curves.metrics_from(of_solids, boxes)
+    metrics |= true_fields.metrics_from(of_true)
+    metrics |= fused.metrics_from(of_fusion) | carton.metrics_from(of_carton)
+    missing |= dict.fromkeys(carton.METRICS, why_no_carton or "too little of the carton was found")
+    missing |= dict.fromkeys(fused.METRICS, why_no_fusion or "no solid could be made")
+    missing[true_fields.METRIC] = why_no_true
+    return Found(document, metrics, missing)
 
 
 def measure_times(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
@@ -250,24 +243,24 @@ def measure_times(given: Sources, networks: Networks, folder: Path, threads: int
     count = 2 if quick else min(SPEED_VIEWS, given.views or SPEED_VIEWS)
     val, test = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
     scene_frames = QUICK_FRAMES if quick else curves.SCENE_FRAMES
-    # What gates are about comes first, while the machine is quiet.
+    # What targets are about comes first, while the machine is quiet.
     of_scenes = curves.measure_scenes(given.bundle, threads, scene_frames)
     saving_frames = QUICK_FRAMES if quick else SAVING_FRAMES
     savings = speed.measure_savings(given.bundle, threads, saving_frames)
     of_fusion, why_no_fusion = fused.found_by(lambda: fused.measure_times(given.bundle, threads, quick))
-    rows = speed.measure(test, networks.bundles, rivals_of(val), threads)
+    rows = speed.measure(test, networks.bundles, baselines_of(val), threads)
     document = {"speed": rows, "savings": savings, "curves_of_scenes": of_scenes, "fusion_times": of_fusion}
-    figures = speed.figures_from(rows) | curves.scene_figures_from(of_scenes) | fused.figures_from(of_fusion)
-    return Found(document, figures, {fused.TIME_FIGURE: why_no_fusion or "no solid could be made"})
+    metrics = speed.metrics_from(rows) | curves.scene_metrics_from(of_scenes) | fused.metrics_from(of_fusion)
+    return Found(document, metrics, {fused.TIME_METRIC: why_no_fusion or "no solid could be made"})
 
 
 def cuts_of(cuts: dict[str, dict[float, int]]) -> dict[str, dict[float, int]]:
     return {level: cuts[level] for level in quality.LEVELS}
 
 
-def rivals_of(val: Sequence[View]) -> dict[str, dict]:
+def baselines_of(val: Sequence[View]) -> dict[str, dict]:
     """Tuned on views of the size that times are measured at."""
-    return {level: tuned_rivals(val, [view.seen(level) for view in val])[0] for level in quality.LEVELS}
+    return {level: tuned_baselines(val, [view.seen(level) for view in val])[0] for level in quality.LEVELS}
 
 
 def solid_of(view: View) -> str:
@@ -281,7 +274,7 @@ def set_ratio(rows: Sequence[dict], own: Sequence[dict]) -> float:
 
 
 def programs_missing() -> dict[str, str]:
-    """Rivals that other libraries bring, and why they are not here."""
+    """Baselines that other libraries bring, and why they are not here."""
     found = {}
     for name, header in (
         ("Voronoi covariance (CGAL)", "CGAL/vcm_estimate_edges.h"),
@@ -289,6 +282,4 @@ def programs_missing() -> dict[str, str]:
     ):
         here = (Path("/usr/include") / header).exists()
         found[name] = "this benchmark has no program for it" if here else f"{header} is not installed"
-    if planes.missing():
-        found[curves.PLANES] = planes.missing()
     return found

@@ -1,4 +1,4 @@
-"""Fields by every way that is compared: the network in the shipped library, in torch, and rivals without a network."""
+"""Runs every compared method: the network in the shipped library, in torch, and baselines without a network."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from benchmarks.edges import rivals
+from benchmarks.edges import baselines
 from benchmarks.edges.edges_api import Edges, EdgesResult, Pinhole
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R
@@ -60,8 +60,8 @@ class NoEdges:
 
 
 @dataclass(frozen=True)
-class RivalField:
-    tuned: rivals.TunedRival
+class BaselineField:
+    tuned: baselines.TunedBaseline
 
     def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
         return self.tuned.run(depth, camera.focal_px)
@@ -89,15 +89,15 @@ def opened(networks: Networks, threads: int, stack: ExitStack) -> dict[str, Meth
     return found
 
 
-def tuned_rivals(views: Sequence[View], seen: Sequence[np.ndarray]) -> tuple[dict[str, Method], dict[str, str]]:
-    """Rivals with what suits these views best, and why others are missing. seen: what the sensor reports of each."""
+def tuned_baselines(views: Sequence[View], seen: Sequence[np.ndarray]) -> tuple[dict[str, Method], dict[str, str]]:
+    """Baselines with what suits these views best, and why others are missing. seen: what the sensor reports of each."""
     found, missing = {}, {}
     counts = [view.frame.counts & (depth > 0) for view, depth in zip(views, seen, strict=True)]
-    for name, rival in rivals.RIVALS.items():
-        why = rival.missing()
+    for name, baseline in baselines.BASELINES.items():
+        why = baseline.missing()
         if why:
             missing[name] = why
             continue
         focal, truth = [view.camera.focal_px for view in views], [view.frame.distance for view in views]
-        found[name] = RivalField(rivals.tuned(rival, seen, focal, truth, counts))
+        found[name] = BaselineField(baselines.tuned(baseline, seen, focal, truth, counts))
     return found, missing

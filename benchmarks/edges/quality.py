@@ -1,4 +1,4 @@
-"""Errors of fields on held-out views, as sensors see them, beside rivals whose settings suit validation views best."""
+"""Measures errors of fields on held-out views of simulated sensors, beside baselines tuned on validation views."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from dataclasses import dataclass, field
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED, Method, NoEdges, tuned_rivals
-from benchmarks.edges.rivals import RIVALS
+from benchmarks.edges.baselines import BASELINES
+from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED, Method, NoEdges, tuned_baselines
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R, SHARP_R
 from export.edges.metrics import STEPS, cuts, frame_figures, summary
 
-LEVELS = ("clean", "tof", "stereo")  # that have gates and rivals
+LEVELS = ("clean", "tof", "stereo")  # that have targets and baselines
 TUNING_VIEWS = 40  # of the validation views, evenly; cuts of networks come from all
 SHOWN = 5  # views of the sheet
 MIN_PIXELS = 1000  # of a group: fewer say nothing
-# Rivals say where edges are, with the threshold that suits their RMSE; distances to these are taken as they are.
+# Baselines say where edges are, with the threshold that suits their RMSE; distances to these are taken as they are.
 OWN_CUTS = {sharp_r: int(sharp_r / EPS_R * STEPS) for sharp_r in SHARP_R}
 
 
 @dataclass
 class Errors:
     """rows: by level and way. groups: of the shipped network, by what is particular about pixels. agreement: of int8
-    and fp32, by level. shown: for the sheet. cuts: by level, where distances of the shipped network are cut. rivals:
+    and fp32, by level. shown: for the sheet. cuts: by level, where distances of the shipped network are cut. baselines:
     the tuned ones, by level. missing: why others are not measured."""
 
     rows: list[dict] = field(default_factory=list)
@@ -36,7 +36,7 @@ class Errors:
     agreement: list[dict] = field(default_factory=list)
     shown: list[dict] = field(default_factory=list)
     cuts: dict[str, dict[float, int]] = field(default_factory=dict)
-    rivals: dict[str, dict[str, Method]] = field(default_factory=dict)
+    baselines: dict[str, dict[str, Method]] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
 
 
@@ -51,20 +51,20 @@ def measure(
         seen_val = [view.seen(level) for view in val]
         if level in LEVELS:
             every = max(1, len(val) // TUNING_VIEWS)
-            errors.rivals[level], errors.missing = tuned_rivals(val[::every], seen_val[::every])
-            ways = {**networks, **errors.rivals[level], NOTHING: NoEdges()}
+            errors.baselines[level], errors.missing = tuned_baselines(val[::every], seen_val[::every])
+            ways = {**networks, **errors.baselines[level], NOTHING: NoEdges()}
         at = {}
         for name, way in ways.items():
-            pairs = () if name in RIVALS else zip(val, seen_val, strict=True)
-            at[name] = cuts([figures_of(way, *pair)[0] for pair in pairs]) if pairs else OWN_CUTS
+            pairs = () if name in BASELINES else zip(val, seen_val, strict=True)
+            at[name] = cuts([metrics_of(way, *pair)[0] for pair in pairs]) if pairs else OWN_CUTS
         errors.cuts[level] = at[SHIPPED]
         of_way, of_group, same = defaultdict(list), defaultdict(list), []
         for number, view in enumerate(test):
             depth, fields = view.seen(level), {}
             counts = view.frame.counts & (depth > 0)
             for name, way in ways.items():
-                figures, fields[name] = figures_of(way, view, depth)
-                of_way[name].append(figures)
+                metrics, fields[name] = metrics_of(way, view, depth)
+                of_way[name].append(metrics)
             if FLOAT in fields:
                 same.append(((fields[FLOAT] < 1) == (fields[SHIPPED] < 1))[depth > 0].mean())
             if level in LEVELS:
@@ -73,23 +73,23 @@ def measure(
                         of_group[axis, name].append(of_pixels(fields[SHIPPED], view, counts & mask))
                 if number in chosen:
                     errors.shown.append({"level": level, "view": view, "depth": depth, "fields": fields})
-        for name, figures in of_way.items():
-            ms = statistics.median(row["ms"] for row in figures)
-            errors.rows.append({"level": level, "way": name, **summary(figures, at[name]), "ms": round(ms, 3)})
-        for (axis, name), figures in of_group.items():
-            pixels = sum(row["pixels"] for row in figures)
+        for name, metrics in of_way.items():
+            ms = statistics.median(row["ms"] for row in metrics)
+            errors.rows.append({"level": level, "way": name, **summary(metrics, at[name]), "ms": round(ms, 3)})
+        for (axis, name), metrics in of_group.items():
+            pixels = sum(row["pixels"] for row in metrics)
             if pixels >= MIN_PIXELS:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", RuntimeWarning)  # views without such pixels are left out
-                    means = {k: _or_none(v) for k, v in summary(figures, at[SHIPPED]).items()}
+                    means = {k: _or_none(v) for k, v in summary(metrics, at[SHIPPED]).items()}
                 errors.groups.append({"level": level, "axis": axis, "group": name, "pixels": pixels, **means})
         if same:
             errors.agreement.append({"level": level, "same_side": float(np.mean(same))})
     return errors
 
 
-def figures_of(way: Method, view: View, depth: np.ndarray) -> tuple[dict, np.ndarray]:
-    """Figures of one view with the milliseconds, and the field."""
+def metrics_of(way: Method, view: View, depth: np.ndarray) -> tuple[dict, np.ndarray]:
+    """Metrics of one view with the milliseconds, and the field."""
     distance, ms = way.run(depth, view.camera)
     return of_pixels(distance, view, view.frame.counts & (depth > 0)) | {"ms": ms}, distance
 
@@ -102,8 +102,8 @@ def of_set(test: Sequence[View], way: Method, at: Mapping[str, Mapping[float, in
     """Rows of one way on another set of views. at: by level, where `measure` cut distances."""
     rows = []
     for level, cut in at.items():
-        figures = [figures_of(way, view, view.seen(level))[0] for view in test]
-        rows.append({"level": level, **{k: _or_none(v) for k, v in summary(figures, cut).items()}})
+        metrics = [metrics_of(way, view, view.seen(level))[0] for view in test]
+        rows.append({"level": level, **{k: _or_none(v) for k, v in summary(metrics, cut).items()}})
     return rows
 
 
@@ -112,21 +112,21 @@ def _or_none(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def figures_from(rows: Sequence[Mapping], agreement: Sequence[Mapping]) -> dict[str, float]:
-    """Those that are gates."""
+def metrics_from(rows: Sequence[Mapping], agreement: Sequence[Mapping]) -> dict[str, float]:
+    """Those that are targets."""
     found = {(row["level"], row["way"]): row for row in rows}
-    figures, by_rival, by_float = {}, [], []
+    metrics, by_baseline, by_float = {}, [], []
     for level in LEVELS:
         ours = found[level, SHIPPED]
-        figures[f"edges_rmse_{level}"] = ours["rmse_r"]
-        figures[f"edges_recall_4r_{level}"] = 100 * ours["recall_4r"]
-        others = [row["rmse_r"] for (its, way), row in found.items() if its == level and way in RIVALS]
-        by_rival.append(ours["rmse_r"] / min(others))
+        metrics[f"edges_rmse_{level}"] = ours["rmse_r"]
+        metrics[f"edges_recall_4r_{level}"] = 100 * ours["recall_4r"]
+        others = [row["rmse_r"] for (its, way), row in found.items() if its == level and way in BASELINES]
+        by_baseline.append(ours["rmse_r"] / min(others))
         if (level, FLOAT) in found:
             by_float.append(100 * (ours["rmse_r"] / found[level, FLOAT]["rmse_r"] - 1))
-    figures["edges_recall_r_clean"] = 100 * found["clean", SHIPPED]["recall_1r"]
-    figures["edges_rmse_by_rival"] = max(by_rival)
+    metrics["edges_recall_r_clean"] = 100 * found["clean", SHIPPED]["recall_1r"]
+    metrics["edges_rmse_by_baseline"] = max(by_baseline)
     if by_float:
-        figures["edges_int8_rmse_percent"] = max(by_float)
-        figures["edges_int8_same_side"] = 100 * min(row["same_side"] for row in agreement)
-    return figures
+        metrics["edges_int8_rmse_percent"] = max(by_float)
+        metrics["edges_int8_same_side"] = 100 * min(row["same_side"] for row in agreement)
+    return metrics

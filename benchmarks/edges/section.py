@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks.edges import sensitivity
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED
-from benchmarks.edges.pictures import front_of
+from benchmarks.edges.plots import front_of
 from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.section_of_views import SAYS, carton_parts, fusion_parts, round_parts
 from benchmarks.edges.speed import SCENES
@@ -28,8 +27,6 @@ def section(measured: dict) -> tuple[str, list]:
         parts += error_parts(measured)
     if "curves" in measured:
         parts += curve_parts(measured)
-    if measured.get("sensitivity"):
-        parts += sensitivity_parts(measured["sensitivity"])
     if "speed" in measured:
         parts += [
             *speed_parts(measured["speed"]),
@@ -58,7 +55,6 @@ def error_parts(measured: dict) -> list:
         "r or 4 r, those called sharp; false: of the others, those called sharp. Ways without a network find edges "
         "with thresholds of the smallest RMSE; what is nearer to these than r or 4 r is called sharp. Time: the "
         "library's own for our networks; of the ways without a network, Python's and OpenCV's.",
-        *voronoi_parts(measured.get("voronoi")),
         ANCHORS,
         *sheet_parts(measured["sheet"]),
     ]
@@ -69,25 +65,6 @@ def error_parts(measured: dict) -> list:
     parts += [noise_rows(measured["errors"])]
     parts += set_parts(measured["sets"])
     return parts + group_parts(measured["groups"])
-
-
-def voronoi_parts(found: dict | None) -> list:
-    if found is None:
-        return []
-    table = [["on a sample of views", *heads(), "ms"]]
-    for row in found["rows"]:
-        table.append([f"{SAYS[row['level']]}: {row['way']}", *cells(row), f"{row['ms']:.0f}"])
-    radii = "; ".join(
-        f"{SAYS[level]}: cells within {chosen['radii_r'][0]:g} r, averaged over {chosen['radii_r'][1]:g} r, sharp from "
-        f"{chosen['cut']:.3f} on"
-        for level, chosen in found["settings"].items()
-    )
-    return [
-        table,
-        "Covariance of Voronoi cells (Mérigot, Ovsjanikov and Guibas 2011), an own reference in numpy, on "
-        f"{found['views']['test']} of the test views, with what suits {found['views']['val']} validation views: "
-        f"{radii}.",
-    ]
 
 
 def cells(row: dict) -> list[str]:
@@ -194,19 +171,6 @@ def scene_rows(rows: list[dict]) -> list[list[str]]:
     return table
 
 
-def sensitivity_parts(rows: list[dict]) -> list:
-    table = [["parameter of curves", "half, shipped, double", *(f"F, {SAYS[level]}" for level in LEVELS)]]
-    for row in rows:
-        scores = (", ".join(f"{value:.3f}" for value in row["f_score"][level]) for level in LEVELS)
-        table.append([f"`{row['parameter']}`", ", ".join(f"{value:g}" for value in row["values"]), *scores])
-    return [
-        (sensitivity.PICTURE, "F-score of curves with half and double of each parameter of extraction."),
-        table,
-        f"Means over {sensitivity.VIEWS} validation views at most, of the network's fields; other parameters have "
-        "their defaults.",
-    ]
-
-
 def curve_parts(measured: dict) -> list:
     solids = [["curves, 320 x 240", "views", *curve_heads(), "curves, ms"]]
     for row in measured["curves_of_true_fields"]:
@@ -223,8 +187,7 @@ def curve_parts(measured: dict) -> list:
         solids,
         "By length: precision of what is found within 2 r of a true curve, recall of true curves within 2 r of a found "
         "one, means over views. Roundings that are neither sharp nor smooth count neither for nor against. Distances "
-        "end at 100 r. Planes are those of OpenCV, with the threshold that suits validation views: they give creases, "
-        "no boundaries.",
+        "end at 100 r.",
         boxes,
         "The largest box of a frame with the sides of the true carton, both by size; frames without a box have no "
         "error and are in the percentage alone.",

@@ -44,7 +44,7 @@ class Setting:
     width_px: int = FULL_PX[0]
     options: dict[str, int] = field(default_factory=dict)
     ms: list[float] = field(default_factory=list)
-    figures: dict[str, list[dict]] = field(default_factory=lambda: {level: [] for level in LEVELS})
+    metrics: dict[str, list[dict]] = field(default_factory=lambda: {level: [] for level in LEVELS})
 
 
 def settings(bundles: Sequence[str]) -> list[Setting]:
@@ -80,12 +80,12 @@ def reduced(way: Method, depth: np.ndarray, camera: Pinhole, width_px: int) -> t
 
 
 def measure(
-    views: Sequence[View], bundles: Mapping[str, Path], rivals: Mapping[str, Mapping[str, Method]], threads: int
+    views: Sequence[View], bundles: Mapping[str, Path], baselines: Mapping[str, Mapping[str, Method]], threads: int
 ) -> list[dict]:
-    """Rows of every setting and rival on frames of FULL_PX: median milliseconds, and RMSE in r of the full frame, by
-    level and their mean. rivals: by level."""
+    """Rows of every setting and baseline on frames of FULL_PX: median milliseconds, and RMSE in r of the full frame, by
+    level and their mean. baselines: by level."""
     wanted = settings(list(bundles))
-    rival_rows = [Setting(name, "without a network", "") for name in next(iter(rivals.values()), {})]
+    rival_rows = [Setting(name, "without a network", "") for name in next(iter(baselines.values()), {})]
     with ExitStack() as stack:
         ways = {}
         for setting in wanted:
@@ -100,14 +100,14 @@ def measure(
                     if setting.bundle:
                         way: Method = _Library(ways[setting.bundle, *setting.options.items()])
                     else:
-                        way = rivals[level][setting.name]
+                        way = baselines[level][setting.name]
                     distance, ms = reduced(way, depth, view.camera, setting.width_px)
                     if number:  # the first frame of a size prepares the network
                         setting.ms.append(ms)
-                        setting.figures[level].append(of_pixels(distance, view, counts))
+                        setting.metrics[level].append(of_pixels(distance, view, counts))
     rows = []
     for setting in [*wanted, *rival_rows]:
-        rmse = {level: float(np.nanmean([f["rmse_r"] for f in found])) for level, found in setting.figures.items()}
+        rmse = {level: float(np.nanmean([f["rmse_r"] for f in found])) for level, found in setting.metrics.items()}
         rows.append({"setting": setting.name, "axis": setting.axis, "width_px": setting.width_px,
                      "ms": round(statistics.median(setting.ms), 3), "ms_p90": round(_p90(setting.ms), 3),
                      "rmse_r": round(float(np.mean(list(rmse.values()))), 4),
@@ -179,7 +179,7 @@ def stream_cost(bundle: Path, threads: int, folder: Path) -> dict[str, float]:
             "edges_own_allocations": own / counted["frames"]}  # fmt: skip
 
 
-def figures_from(rows: Sequence[Mapping]) -> dict[str, float]:
+def metrics_from(rows: Sequence[Mapping]) -> dict[str, float]:
     """Frames a second of the field, by size."""
     shipped = {row["width_px"]: row["ms"] for row in rows if row["axis"] == "shipped"}
     return {f"edges_fps_{width}": 1000 / shipped[width] for width in (320, 640)}

@@ -1,7 +1,7 @@
-"""Curves from the true fields of views: what extraction reaches by itself, which has a gate of its own, and what it
+"""Curves from the true fields of views: what extraction reaches by itself, which has a target of its own, and what it
 reaches with the depth of sensors, whose error along the ray no field takes away.
 
-The program is that of benchmarks.edge_curves, which also says why what is missing is missing.
+The program is that of benchmarks.edges.curve_extraction, which also says why what is missing is missing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import BinaryIO
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.edge_curves import PROGRAM, extracted, pack_field
+from benchmarks.edges.curve_extraction import PROGRAM, extracted, pack_field
 from benchmarks.edges.curve_scores import view_score
 from benchmarks.edges.curves import mean_of, with_curves
 from benchmarks.edges.edges_api import TYPES, Curves
@@ -21,7 +21,7 @@ from benchmarks.edges.quality import LEVELS
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R
 
-FIGURE = "edges_curves_true"
+METRIC = "edges_curves_true"
 
 
 def measure(views: Sequence[View], folder: Path) -> list[dict]:
@@ -65,6 +65,6 @@ def found_in(views: Sequence[View], folder: Path) -> tuple[list[dict], str]:
         return [], str(error)
 
 
-def figures_from(rows: Sequence[Mapping]) -> dict[str, float]:
+def metrics_from(rows: Sequence[Mapping]) -> dict[str, float]:
     by_level = {row["level"]: row["f_score"] for row in rows}
-    return {FIGURE: by_level["clean"]} if "clean" in by_level else {}
+    return {METRIC: by_level["clean"]} if "clean" in by_level else {}

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.edges.baselines import points_of
 from benchmarks.edges.edges_api import Pinhole
-from benchmarks.edges.rivals import points_of
 from export.edges.config import SHARP_R
 from export.edges.curve_metrics import STEP_R, places_on
 from export.edges.data import Frame, RecordError, frame_of

@@ -1,9 +1,11 @@
-"""The whole report of heads: distances by seconds of fitting beside baselines (`quality.py`), real photographs, what
-settings cost, the program, the engine, and a sheet to look at.
+"""Writes the report of heads: distances by seconds of fitting beside baselines (`quality.py`), real photographs,
+settings, the program, the field kernels beside PyTorch, and a contact sheet.
 
-python -m benchmarks.heads --out docs/benchmarks/heads.md        10 to 30 minutes with all heads and times
-python -m benchmarks.heads --heads 2 --seconds 0 1               does it run?
-python -m benchmarks.heads --parts engine program                some parts again: the others stay as they were
+    python -m benchmarks.heads --out docs/benchmarks/heads.md        10 to 30 minutes with all heads and times
+    python -m benchmarks.heads --heads 2 --seconds 0 1               a smoke test
+    python -m benchmarks.heads --parts field_kernels program         some parts again; the others are kept
+
+Each part records its commit and date. A page in docs/benchmarks is not written if its parts are of different commits.
 """
 
 from __future__ import annotations
@@ -12,15 +14,18 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from benchmarks.heads import engine, prior_limit, program, quality, real_faces, report, savings, sheet
+from benchmarks import provenance
+from benchmarks.heads import ablation, contact_sheet, field_kernels, prior_limit, program, quality, real_faces, report
 from benchmarks.heads.photos import Photo, PhotoBackgrounds, TrueHead
 
-PARTS = ("quality", "prior", "real", "savings", "program", "engine", "sheet")
+PARTS = ("quality", "prior", "real", "ablation", "program", "field_kernels", "sheet")
+PUBLISHED = Path("docs/benchmarks")
 
 
 def front_photos(options: argparse.Namespace, count: int) -> list[tuple[TrueHead, Photo]]:
-    """Of the first test heads one photo each."""
+    """Returns one photo of each of the first test heads."""
     backgrounds, found = PhotoBackgrounds(options.backgrounds), []
     for head in quality.read_made_heads(options.data, min(count, options.heads), quality.make_maker()):
         number = head.front()
@@ -30,8 +35,8 @@ def front_photos(options: argparse.Namespace, count: int) -> list[tuple[TrueHead
 
 
 def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]:
-    """What each part adds to the figures, beside those of `quality.py`."""
-    # --photos names those of the test split; photos of the other splits lie beside them.
+    """Returns a function for each part besides quality; its result is added to the metrics."""
+    # --photos is the folder of the test split; the other splits lie beside it.
     bundle, faces = options.bundles[0], options.data / "photos"
 
     def of_program() -> dict:
@@ -42,10 +47,6 @@ def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]
         heads = quality.read_made_heads(options.data, options.heads, quality.make_maker())
         return {"prior": prior_limit.measure_prior(bundle, options.data / "points/test", heads)}
 
-    def of_savings() -> dict:
-        heads = front_photos(options, options.setting_heads)
-        return {"savings": savings.measure_savings(bundle, heads, options.at, options.threads)}
-
     return {
         "prior": of_prior,
         "real": lambda: {
@@ -53,45 +54,52 @@ def measured_parts(options: argparse.Namespace) -> dict[str, Callable[[], dict]]
                 bundle, options.photos.parent, faces, sorted(options.seconds), options.heads, options.threads
             )
         },
-        "savings": lambda: {
-            "savings": savings.measure_savings(
+        "ablation": lambda: {
+            "ablation": ablation.measure_settings(
                 bundle, front_photos(options, options.setting_heads), options.at, options.threads
             )
         },
         "program": of_program,
-        "engine": lambda: {"engine": engine.measure_engine()},
+        "field_kernels": lambda: {"field_kernels": field_kernels.measure_kernels()},
     }
 
 
 def parser_of() -> argparse.ArgumentParser:
     parser = quality.parser_of(__doc__)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="default: all")
-    parser.add_argument("--setting-heads", type=int, default=6, help="heads that settings are compared on")
-    sheet.add_arguments(parser)
+    parser.add_argument("--setting-heads", type=int, default=6, help="heads for comparing settings")
+    contact_sheet.add_arguments(parser)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = quality.parsed(arguments, parser_of())
+    now = provenance.stamp()
     if "quality" in options.parts:
-        measured = quality.run(options)
-    elif options.figures.exists():
-        measured = json.loads(options.figures.read_text())
+        measured = quality.run(options) | {"measured": {"quality": now}}
+    elif options.metrics.exists():
+        measured = json.loads(options.metrics.read_text())
         options.at = measured["at_s"]
     else:
-        raise SystemExit(f"{options.figures} is not there yet: measure the part quality first.")
+        raise SystemExit(f"{options.metrics} does not exist yet. Measure the part quality first.")
     for name, part in measured_parts(options).items():
         if name in options.parts:
             try:
                 measured |= quality.shortened(part())
-                options.figures.write_text(json.dumps(measured, indent=1) + "\n")
-            except OSError as error:  # a program that is not built, data that are not there
+                measured.setdefault("measured", {})[name] = now
+            except OSError as error:  # the program is not built, or data are missing
                 print(f"The part {name} is left out: {error}", file=sys.stderr)
+    options.metrics.write_text(json.dumps(measured, indent=1) + "\n")
+    stamps = measured.get("measured", {})
+    if options.out.resolve().parent == PUBLISHED.resolve():
+        names = [name for name in PARTS if name in stamps or name in measured]
+        if refusal := provenance.refusal(stamps, names, f"python -m benchmarks.heads --out {options.out} --parts"):
+            raise SystemExit(refusal)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     picture = options.out.with_name(f"{options.out.stem}-sheet.jpg")
     if "sheet" in options.parts:
-        sources = sheet.Sources(options.data, options.backgrounds, options.photos, options.photo_count)
-        sheet.draw(measured, options.bundles[0], sources, picture, options.threads)
+        sources = contact_sheet.Sources(options.data, options.backgrounds, options.photos, options.photo_count)
+        contact_sheet.draw(measured, options.bundles[0], sources, picture, options.threads)
     text = report.page(measured, picture.name if picture.exists() else "")
     options.out.write_text(text)
     print(text)

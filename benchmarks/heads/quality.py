@@ -4,7 +4,7 @@
 
 In: `make build`, the bundle, pictures and points of test heads (`export.heads.view_shards test`, `export.heads.points
 test`), what they are made from (`export.people.assets`), heads of another maker (`benchmarks.heads.other_heads`),
-photos without people (`export.photos backgrounds`). Out: tables (Markdown) and all figures (JSON). The library is given
+photos without people (`export.photos backgrounds`). Out: tables (Markdown) and all metrics (JSON). The library is given
 the head's box, and its focal length only with --known-focal.
 """
 
@@ -50,7 +50,7 @@ from export.scenes.perceptual import Perceptual, load_perceptual
 
 KNOWN, EIGHT = "one photo, focal length known", "eight photos"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
-FIGURES = Path("build/benchmarks/heads.json")
+METRICS = Path("build/benchmarks/heads.json")
 PERCEPTUAL = Path(".data/teachers/backbone.pt")
 TEXTURE_PX = 512  # a side
 SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -178,7 +178,7 @@ def measure_views(painter: Painter, case: Case, known_focal: bool = False) -> di
 
 
 def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
-    """Figures of a fit to the photos that the builder has. Raises MaquetteError."""
+    """Metrics of a fit to the photos that the builder has. Raises MaquetteError."""
     true = case.head.true
     with builder.fit(asked_s) as result:
         start = time.perf_counter()
@@ -267,12 +267,12 @@ def parser_of(description: str) -> argparse.ArgumentParser:
                         help=f"the first is reported, others beside it; default: {BUNDLE}")  # fmt: skip
     parser.add_argument("--heads", type=int, default=20, help="of each set, at most")
     parser.add_argument("--seconds", type=float, nargs="+", default=SECONDS, help="times of fitting")
-    parser.add_argument("--at", type=float, default=2.0, help="the time whose figures are compared with targets")
+    parser.add_argument("--at", type=float, default=2.0, help="the time whose metrics are compared with targets")
     parser.add_argument("--sets", nargs="+", choices=("one", "three", "other"), default=("one", "three", "other"))
     parser.add_argument("--known-focal", action="store_true", help="give the library the focal length")
     parser.add_argument("--threads", type=int, default=0, help="0: the library chooses")
     parser.add_argument("--out", type=Path, default=Path("build/benchmarks/heads.md"), help="the tables")
-    parser.add_argument("--figures", type=Path, default=FIGURES, help=f"all figures; default: {FIGURES}")
+    parser.add_argument("--metrics", type=Path, default=METRICS, help=f"all metrics; default: {METRICS}")
     return parser
 
 
@@ -284,7 +284,7 @@ def parsed(arguments: Sequence[str] | None = None, parser: argparse.ArgumentPars
 
 
 def run(options: argparse.Namespace) -> dict:
-    """Measures all that `parsed` says, and writes the figures."""
+    """Measures all that `parsed` says, and writes the metrics."""
     maker = make_maker()
     sets, backgrounds, rows = sets_of(options, maker), PhotoBackgrounds(options.backgrounds), []
     for number, bundle in enumerate(options.bundles):
@@ -304,8 +304,8 @@ def run(options: argparse.Namespace) -> dict:
         "known_focal": options.known_focal,
         "rows": shortened(rows),
     }
-    options.figures.parent.mkdir(parents=True, exist_ok=True)
-    options.figures.write_text(json.dumps(measured, indent=1) + "\n")
+    options.metrics.parent.mkdir(parents=True, exist_ok=True)
+    options.metrics.write_text(json.dumps(measured, indent=1) + "\n")
     return measured
 
 

@@ -90,7 +90,7 @@ def real_faces(photos: Path, faces: Path, splits: Sequence[str] = SPLITS) -> Ite
                 )  # fmt: skip
 
 
-def figures_of(face: RealFace, mesh: PosedMesh) -> dict:
+def metrics_of(face: RealFace, mesh: PosedMesh) -> dict:
     """points_px: mean distance of its points from where the network sees them; points: the same by the distance of the
     eyes' corners; matte_iou: None where the person's mask says nothing of the head."""
     used = face.weight > 0
@@ -153,11 +153,11 @@ def measure_real(
             about = {"face": face.name, "split": face.split, "eyes_px": face.eyes_px}
             try:
                 before = {
-                    f"mean_{key}": value for key, value in figures_of(face, mean.posed(face.rgb, face.box)).items()
+                    f"mean_{key}": value for key, value in metrics_of(face, mean.posed(face.rgb, face.box)).items()
                 }
                 for asked in seconds:
                     rows.append(
-                        about | before | {"asked_s": asked} | figures_of(face, fitted_mesh(builder, face, asked))
+                        about | before | {"asked_s": asked} | metrics_of(face, fitted_mesh(builder, face, asked))
                     )
             except (MaquetteError, ValueError) as error:
                 rows += [about | {"asked_s": asked, "missing": str(error)} for asked in seconds]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from statistics import fmean, median
 
-from benchmarks.heads.engine import engine_table
-from benchmarks.heads.savings import settings_table
+from benchmarks import provenance
+from benchmarks.heads.ablation import settings_table
+from benchmarks.heads.field_kernels import kernel_table
 from benchmarks.heads.tables import (
     by_baseline,
     by_group,
@@ -29,7 +30,7 @@ sign left out; *camera rotated by*: the median angle to the true camera, in fram
 are rendered, in front of photographs, from up to 45° to the side; the library is given the head's box"""
 
 _TIME = """A fit ends by its time, by 300 steps, or when the pixels held out gain no more. Where time ends it, the
-figures depend on the machine and on what else it does: the column of steps says how far it came."""
+metrics depend on the machine and on what else it does: the column of steps says how far it came."""
 
 _BASELINES = """*Linear head*: the 64 principal components of the vertices of the training heads, fitted to what the
 same encoder sees (template points) with the same camera model and prior. *MediaPipe's 468 points*: its face network's
@@ -40,8 +41,8 @@ of six views 30° to 60° around from the photo, in its light, before grey; of t
 512, and *without texture* with the network's colours. The mean head has the photo projected onto it by the true
 camera, and where the photo does not see it the colour of the nearest place that it does. *By features*: how far
 features of the person detector's trunk differ, relative to their size, averaged over four layers (lower is better);
-in the manner of LPIPS, without anybody's judgement in it. NeuS from a sphere is not among them: it takes minutes, and
-is a command of its own (`python -m benchmarks.heads.alone.neus`, figures in docs/heads.md)."""
+in the manner of LPIPS, without anybody's judgement in it. NeuS from a sphere takes minutes and is not
+among them (its errors are in docs/heads.md; its program is at the tag studies-0.2)."""
 
 _REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
 mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted
@@ -80,7 +81,7 @@ def warning(rows: Sequence[Mapping], at_s: float) -> str:
     steps = median(row["steps"] for row in found(rows) if row["asked_s"] == at_s)
     return (
         f"**Fits of {at_s:g} s came no further than {steps:.0f} steps: the machine was busy, or is too slow for this "
-        "time. Measure again, on a quiet machine or with more `--seconds`, before you believe figures of the fit and "
+        "time. Measure again, on a quiet machine or with more `--seconds`, before you believe metrics of the fit and "
         "times; those at 0 s, of baselines and of sizes hold.**"
     )
 
@@ -131,19 +132,19 @@ def _more_parts(measured: Mapping, sheet: str) -> list[str]:
         ]
     if measured.get("real"):
         parts += _real_parts(measured["real"], at_s)
-    if measured.get("savings"):
+    if measured.get("ablation"):
         parts += [
             _title("what settings cost and gain"),
-            settings_table(measured["savings"]),
+            settings_table(measured["ablation"]),
             "One photo, one setting changed at a time; times are medians from the photo to the mesh. What the engine "
             "leaves out of itself (empty blocks, rays that miss) has no switch.",
         ]
     if measured.get("program"):
         parts += _program_parts(measured["program"])
-    if measured.get("engine"):
+    if measured.get("field_kernels"):
         parts += [
             _title("the engine, one thread"),
-            engine_table(measured["engine"]),
+            kernel_table(measured["field_kernels"]),
             "Both in turn, the fastest runs; PyTorch in the batch size that suits it best. *Of the float peak*: "
             "multiply-adds by the rate of the fastest matrix product on this machine.",
         ]
@@ -164,7 +165,8 @@ def page(measured: Mapping, sheet: str = "") -> str:
     parts = [
         "# Heads from photos: how far from the true ones",
         f"Bundle {bundles[0]}; {machine['processor']}, {machine['cores']} cores. Written by `python -m "
-        "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)).",
+        "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)). "
+        f"{provenance.sentence(measured.get('measured', {}))}",
         f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and knows nothing of the camera'}.",
         _TIME,
         *filter(None, [warning(rows, at_s)]),

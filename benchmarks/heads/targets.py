@@ -1,4 +1,4 @@
-"""What is aimed at, beside what was measured."""
+"""Compares measured metrics of heads with their targets."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class _Lines:
         self,
         what: str,
         value: float,
-        gate: float,
-        stretch: float,
+        target: float,
+        goal: float,
         sign: str = "≤",
         digits: int = 2,
         of_fit: bool = True,
@@ -39,23 +39,23 @@ class _Lines:
         def is_met(limit: float) -> bool:
             return value >= limit if sign == "≥" else value <= limit
 
-        state = "stretch" if is_met(stretch) else "met" if is_met(gate) else "missed"
+        state = "goal" if is_met(goal) else "met" if is_met(target) else "missed"
         if not is_measured or (of_fit and not self._are_fits_whole):
             state = "not measured"
-        self.lines.append([what, f"{value:.{digits}f}", f"{sign} {gate:g}", f"{sign} {stretch:g}", state])
+        self.lines.append([what, f"{value:.{digits}f}", f"{sign} {target:g}", f"{sign} {goal:g}", state])
 
 
 def targets(measured: Mapping) -> str:
-    """Figures of the first bundle; what was not measured is left out."""
+    """Metrics of the first bundle; what was not measured is left out."""
     rows = [row for row in measured["rows"] if row["bundle"] == measured["bundles"][0]]
     at_s = measured["at_s"]
     lines = _Lines(not ended_too_early(rows, at_s))
     of_time = [row for row in found(rows) if row["asked_s"] == at_s]
 
-    def add(name: str, what: str, figure: Callable, gate: float, stretch: float, sign: str = "≤", needs=()) -> None:
+    def add(name: str, what: str, metric: Callable, target: float, goal: float, sign: str = "≤", needs=()) -> None:
         own = having([row for row in of_time if row["set"] == name], *needs)
         if own:
-            lines.add(f"{name}: {what}", figure(own), gate, stretch, sign)
+            lines.add(f"{name}: {what}", metric(own), target, goal, sign)
 
     def mean(key: str) -> Callable[[Sequence[Mapping]], float]:
         return lambda own: fmean(row[key] for row in own)
@@ -87,9 +87,9 @@ def targets(measured: Mapping) -> str:
     add(ONE, "rotation of the camera, median, deg", lambda own: median(r["rotation_deg"] for r in own), 4, 2)
     add(ONE, "focal length within 20 %, of photos", focal_within, 0.7, 0.85, "≥")
     _of_program(measured, lines)
-    _of_engine(measured, lines)
+    _of_kernels(measured, lines)
     add(ONE, "mesh at 1.6 mm, s", lambda own: median(row["mesh_ms"] for row in own) / 1000, 1, 0.4)
-    return table(("what", "figure", "gate", "stretch", "state"), lines.lines)
+    return table(("metric", "value", "threshold", "goal", "state"), lines.lines)
 
 
 def _of_real_faces(measured: Mapping, lines: _Lines) -> None:
@@ -113,8 +113,8 @@ def _of_program(measured: Mapping, lines: _Lines) -> None:
         lines.add("bundle, MB", measured["bundle_mb"], 4, 2.8, of_fit=False)
 
 
-def _of_engine(measured: Mapping, lines: _Lines) -> None:
-    own = [row for row in measured.get("engine", ()) if row["what"] == "forward, back to all weights"]
+def _of_kernels(measured: Mapping, lines: _Lines) -> None:
+    own = [row for row in measured.get("field_kernels", ()) if row["what"] == "forward, back to all weights"]
     if own:
         best = min(own, key=lambda row: row["us"])
         # More than the peak cannot be: others kept PyTorch from showing it.

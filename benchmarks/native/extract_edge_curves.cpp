@@ -1,11 +1,10 @@
-// The curves of fields that benchmarks/edge_curves.py packed into a file, one JSON object a view:
-//   extract_edge_curves FIELDS [OPTION=VALUE ..]
+// Extracts curves from fields that benchmarks/edges/curve_extraction.py packed into a file; prints a JSON object a
+// view:
+//   extract_edge_curves FIELDS
 // FIELDS: for each view int32 width, height; float64 fx, fy, cx, cy, eps_r, spread_r; the planes distance_r (float32),
-// depth_m (float32) and kind (uint8). OPTION: a member of CurveOptions.
+// depth_m (float32) and kind (uint8).
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
-#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -13,35 +12,6 @@
 #include "edges/curves/curve_extractor.h"
 
 namespace {
-
-using maq::CurveOptions;
-
-maq::CurveOptions options_of(int count, char** arguments) {
-  CurveOptions options;
-  std::map<std::string, float*> members{
-      {"select_px", &options.select_px},     {"min_votes", &options.min_votes},
-      {"smear_px", &options.smear_px},       {"support_px", &options.support_px},
-      {"break_deg", &options.break_deg},     {"min_length_px", &options.min_length_px},
-      {"tolerance_r", &options.tolerance_r}, {"gap_r", &options.gap_r},
-      {"join_px", &options.join_px}};
-  for (int i = 0; i < count; ++i) {
-    const std::string text = arguments[i];
-    const size_t equals = text.find('=');
-    const std::string name = text.substr(0, equals);
-    const char* value = equals == std::string::npos ? "" : arguments[i] + equals + 1;
-    char* end = nullptr;
-    const double number = std::strtod(value, &end);
-    if (end == value || *end != 0) throw std::invalid_argument(text + " is not OPTION=NUMBER");
-    if (name == "max_curves") {
-      options.max_curves = int(number);
-    } else if (members.count(name) != 0) {
-      *members[name] = float(number);
-    } else {
-      throw std::invalid_argument(name + " is no member of CurveOptions");
-    }
-  }
-  return options;
-}
 
 template <class T>
 void read(std::FILE* file, T* to, size_t count) {
@@ -80,19 +50,15 @@ void print(const maq::EdgeCurves& found) {
     }
     std::printf("]}");
   }
-  const maq::CurveCounts& c = found.counts;
-  std::printf(
-      "], \"corners\": %zu, \"counts\": {\"voting_pixels\": %d, \"chains\": %d, \"short_chains\": %d, "
-      "\"without_depth\": %d, \"not_fitted\": %d}}\n",
-      found.corners.size(), c.voting_pixels, c.chains, c.short_chains, c.without_depth, c.not_fitted);
+  std::printf("]}\n");
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
   try {
-    if (count < 2) throw std::invalid_argument("usage: extract_edge_curves FIELDS [OPTION=VALUE ..]");
-    maq::CurveExtractor extractor(options_of(count - 2, arguments + 2));
+    if (count != 2) throw std::invalid_argument("usage: extract_edge_curves FIELDS");
+    maq::CurveExtractor extractor{maq::CurveOptions{}};
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(arguments[1], "rb"), std::fclose);
     if (!file) throw std::runtime_error(std::string(arguments[1]) + " cannot be opened");
     maq::EdgeField field;

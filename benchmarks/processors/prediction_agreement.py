@@ -88,8 +88,8 @@ def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar
             table.add_row(name, *["-"] * 4, "failed")
             continue
         events = "the same" if found.same_events else "others"
-        figures = (str(found.frames), f"{100 * found.worst_bits:.3f}", events, f"{100 * found.same_cells:.2f}")
-        table.add_row(name, *figures, "held" if found.passes(bar) else "missed")
+        metrics = (str(found.frames), f"{100 * found.worst_bits:.3f}", events, f"{100 * found.same_cells:.2f}")
+        table.add_row(name, *metrics, "held" if found.passes(bar) else "missed")
     Console(width=110).print(table)
 
 

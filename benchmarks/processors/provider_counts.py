@@ -5,7 +5,7 @@
 No build of ONNX Runtime for Linux has the XNNPACK provider. LiteRT runs the same graphs (benchmarks/tflite.py) with
 XNNPACK's kernels, on one thread. "Signed": the int8 graphs with signed activations, the only ones that the provider
 takes, in ONNX Runtime's own kernels. Needs scripts/aarch64-sysroot.sh, which brings Python for aarch64; the runtimes
-for it are fetched once. Times on this processor: python -m benchmarks.peers.
+for it are fetched once. Times on this processor: python -m benchmarks.runtimes.
 """
 
 from __future__ import annotations

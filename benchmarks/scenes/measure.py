@@ -4,7 +4,7 @@
     python -m benchmarks --only scenes --quick    two places, two photos of each, to see that it runs
 
 Measured by `maquette scene` on rendered places that no training saw and on real ones, beside ways that need no network.
-A gate that could not be measured is said to be so, with the reason.
+A target that could not be measured is said to be so, with the reason.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import sys
 from pathlib import Path
 
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
-from benchmarks.scenes import pictures as scene_pictures
+from benchmarks.scenes import plots as scene_pictures
 from benchmarks.scenes import quality as scene_quality
 from benchmarks.scenes import speed as scene_speed
 from benchmarks.scenes.settings import SHIPPED, Sources, settings, sources
 from export.scenes.perceptual import load_perceptual
 
-FIGURES = ("scene_fps_500k", "scene_fps_200k_small", "scene_build_s", "scene_bytes_a_point", "scene_gain_db",
+METRICS = ("scene_fps_500k", "scene_fps_200k_small", "scene_build_s", "scene_bytes_a_point", "scene_gain_db",
            "scene_int8_loss_db", "scene_peak_memory_mb", "scene_bundle_mb")  # fmt: skip
 MIN_PLACES, MIN_REAL = 8, 2
 PERCEPTUAL = Path(".data/teachers/backbone.pt")
@@ -55,8 +55,8 @@ def sources_of(options: argparse.Namespace) -> Sources:
 
 
 def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the figures that are gates, and why others are missing. The sheet of pictures is written into
-    `folder`: pictures are in no JSON."""
+    """Returns the document, the metrics with a target, and why others are missing. Writes the contact sheet into
+    `folder`, because JSON holds no images."""
     few = Sources(given.places[:2], given.real[:1], given.bundles, given.tuned) if quick else given
     others = OthersFraction()
     perceptual = load_perceptual(PERCEPTUAL) if PERCEPTUAL.exists() else None
@@ -70,11 +70,11 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     sheet = scene_pictures.write_sheet(shown, rows, folder)
     document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "warnings": warnings,
                 "sheet": sheet.name if sheet else ""}  # fmt: skip
-    figures, missing = quality_figures(rows, given)
-    found, lost = scene_speed.figures_of(speed) if speed else ({}, {})
-    missing = dict.fromkeys(FIGURES, why) | missing | lost
-    figures = {name: round(value, 4) for name, value in (figures | found).items()}
-    return document, figures, {name: reason for name, reason in missing.items() if name not in figures}
+    metrics, missing = quality_figures(rows, given)
+    found, lost = scene_speed.metrics_of(speed) if speed else ({}, {})
+    missing = dict.fromkeys(METRICS, why) | missing | lost
+    metrics = {name: round(value, 4) for name, value in (metrics | found).items()}
+    return document, metrics, {name: reason for name, reason in missing.items() if name not in metrics}
 
 
 def warnings_of(places: list[dict], has_distance: bool) -> list[str]:
@@ -93,10 +93,10 @@ def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float],
     """Those that the rows of rendered places tell, and why others are missing."""
     found = {row["setting"]: row["rendered"] for row in rows}
     said = {row["setting"]: next(iter(row["missing"].values()), "there is no rendered place") for row in rows}
-    figures, missing = {}, {}
+    metrics, missing = {}, {}
     shipped, plain, exact = "as shipped", "plain points", "fp32 networks and descriptors, all varying"
     if found[shipped]:
-        figures["scene_bytes_a_point"] = found[shipped]["bytes_a_point"]
+        metrics["scene_bytes_a_point"] = found[shipped]["bytes_a_point"]
     else:
         missing["scene_bytes_a_point"] = said[shipped]
     for name, better, worse in (("scene_gain_db", shipped, plain), ("scene_int8_loss_db", exact, shipped)):
@@ -104,10 +104,10 @@ def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float],
         if lost:
             missing[name] = said[lost[0]]
         else:
-            figures[name] = found[better]["psnr_db"] - found[worse]["psnr_db"]
+            metrics[name] = found[better]["psnr_db"] - found[worse]["psnr_db"]
     bundle = given.bundles[SHIPPED]
     if bundle.is_dir():
-        figures["scene_bundle_mb"] = sum(path.stat().st_size for path in bundle.iterdir() if path.is_file()) / 1e6
+        metrics["scene_bundle_mb"] = sum(path.stat().st_size for path in bundle.iterdir() if path.is_file()) / 1e6
     else:
         missing["scene_bundle_mb"] = f"no networks in {bundle}"
-    return figures, missing
+    return metrics, missing

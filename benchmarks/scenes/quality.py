@@ -76,7 +76,7 @@ def errors_of(pictures: Sequence[np.ndarray], photos: Photos, perceptual: Percep
     return found
 
 
-Row = dict  # setting, axis, kind, places (figures by place), missing (why, by place)
+Row = dict  # setting, axis, kind, places (metrics by place), missing (why, by place)
 
 
 def rows_of(settings: Sequence[Setting]) -> list[Row]:
@@ -122,11 +122,11 @@ def mean_figures(row: Row, names: Sequence[str]) -> dict[str, float] | None:
         return None
     found = [row["places"][name] for name in names]
     keys = [key for key, value in found[0].items() if isinstance(value, int | float)]
-    return {key: statistics.fmean(figures[key] for figures in found) for key in keys}
+    return {key: statistics.fmean(metrics[key] for metrics in found) for key in keys}
 
 
 class Place:
-    """One place, and what was found there: figures or why there are none, by setting. The middle held-out photo is the
+    """One place, and what was found there: metrics or why there are none, by setting. The middle held-out photo is the
     one to look at."""
 
     def __init__(self, folder: Path, perceptual: Perceptual | None, quick: bool) -> None:
@@ -169,9 +169,9 @@ class Place:
             times_s.append(time.monotonic() - begin_s)
         return pictures, times_s
 
-    def _keep(self, name: str, pictures: list[np.ndarray], figures: dict, shrink: int = 1) -> None:
+    def _keep(self, name: str, pictures: list[np.ndarray], metrics: dict, shrink: int = 1) -> None:
         errors = errors_of(pictures, self.photos[shrink], self._perceptual)
-        self.found[name] = figures | errors
+        self.found[name] = metrics | errors
         if name in SHOWN:
             photo, picture = self.photos[shrink].images[self.middle], pictures[self.middle]
             self.shown[name] = picture
@@ -222,11 +222,11 @@ class Place:
         if not isinstance(points, int) or points < 1:
             raise SceneCommandError(f"{scene} says that it has {points!r} points")
         size = scene.stat().st_size
-        figures = {"points": points, "bytes": size, "bytes_a_point": size / points}
+        metrics = {"points": points, "bytes": size, "bytes_a_point": size / points}
         # It begins with the scene as shipped.
         if "as shipped" in self.found:
-            figures["build_s"] = self.found["as shipped"]["build_s"] + float(setting.tuned.removesuffix("s"))
-        return scene, networks if networks.is_dir() else sources.bundles[SHIPPED], figures
+            metrics["build_s"] = self.found["as shipped"]["build_s"] + float(setting.tuned.removesuffix("s"))
+        return scene, networks if networks.is_dir() else sources.bundles[SHIPPED], metrics
 
     def _run_setting(self, setting: Setting, scene: Path, networks: Path, built: dict, work: Path) -> None:
         photos = self.photos[setting.shrink]
@@ -239,10 +239,10 @@ class Place:
             raise SceneCommandError(f"maquette scene render left out {', '.join(lost)}")
         once = scene_command.render(scene, networks, self.folder, work / "first", photos.names[:1], "--repeat", "1",
                                     *options)  # fmt: skip
-        figures = built | {"frame_ms": made.ms["total"], "stages_ms": made.ms}
+        metrics = built | {"frame_ms": made.ms["total"], "stages_ms": made.ms}
         if "build_s" in built:
-            figures["first_image_s"] = built["build_s"] + once.wall_s
-        self._keep(setting.name, [made.pictures[name] for name in photos.names], figures, setting.shrink)
+            metrics["first_image_s"] = built["build_s"] + once.wall_s
+        self._keep(setting.name, [made.pictures[name] for name in photos.names], metrics, setting.shrink)
 
 
 def _file_of(setting: Setting) -> tuple[bool, str, str, tuple[str, ...]]:

@@ -36,7 +36,7 @@ def section(measured: dict) -> tuple[str, list]:
             "Gaussian window, sigma 1.5, mean of the three channels) of RGB; every pixel counts, borders and "
             "background too. Distance: relative difference of features of the person detector's MobileNetV2, "
             "averaged over four layers; in the manner of LPIPS, but not LPIPS: nobody's judgement is in it, and its "
-            "figures compare with none elsewhere. What is half the size is compared with photos of half the size.",
+            "metrics compare with none elsewhere. What is half the size is compared with photos of half the size.",
         ]
     if any(row["real"] for row in rows):
         parts += ["On the real scenes:", error_rows(rows, "real")]
@@ -76,20 +76,20 @@ def photos_of(places: list[dict]) -> str:
     return f"{sum(place['held_out'] for place in places)} photos"
 
 
-def _shown(figures: dict, key: str, form: str, scale: float = 1) -> str:
-    return format(scale * figures[key], form) if key in figures else ""
+def _shown(metrics: dict, key: str, form: str, scale: float = 1) -> str:
+    return format(scale * metrics[key], form) if key in metrics else ""
 
 
 def error_rows(rows: list[dict], kind: str) -> list[list[str]]:
     """kind: "rendered" or "real"."""
     table = [["way", "first image, s", "a frame, ms", "PSNR, dB", "SSIM", "distance", "points", "bytes a point"]]
     for row in rows:
-        figures = row[kind]
-        if figures and row["axis"] != "not needed":
-            table.append([row["setting"], _shown(figures, "first_image_s", ".2f"), _shown(figures, "frame_ms", ".1f"),
-                          _shown(figures, "psnr_db", ".2f"), _shown(figures, "ssim", ".3f"),
-                          _shown(figures, "distance", ".3f"), _shown(figures, "points", ",.0f"),
-                          _shown(figures, "bytes_a_point", ".1f")])  # fmt: skip
+        metrics = row[kind]
+        if metrics and row["axis"] != "not needed":
+            table.append([row["setting"], _shown(metrics, "first_image_s", ".2f"), _shown(metrics, "frame_ms", ".1f"),
+                          _shown(metrics, "psnr_db", ".2f"), _shown(metrics, "ssim", ".3f"),
+                          _shown(metrics, "distance", ".3f"), _shown(metrics, "points", ",.0f"),
+                          _shown(metrics, "bytes_a_point", ".1f")])  # fmt: skip
     return table
 
 
@@ -104,8 +104,8 @@ def missing_lines(rows: list[dict]) -> list[str]:
 
 def unseen_fraction(rows: list[dict]) -> float:
     """Of the points of the clouds of the rendered scenes, as shipped."""
-    figures = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
-    return 1 - figures["points"] / figures["cloud_points"]
+    metrics = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
+    return 1 - metrics["points"] / metrics["cloud_points"]
 
 
 def place_rows(places: list[dict], rows: list[dict]) -> list[list[str]]:
@@ -115,7 +115,7 @@ def place_rows(places: list[dict], rows: list[dict]) -> list[list[str]]:
     for place in places:
         found = [row["places"].get(place["name"], {}) for row in ways]
         table.append([place["name"] + (", real" if place["real"] else ""), str(place["photos"]),
-                      f"{place['points']:,}", *(_shown(figures, "psnr_db", ".2f") for figures in found)])  # fmt: skip
+                      f"{place['points']:,}", *(_shown(metrics, "psnr_db", ".2f") for metrics in found)])  # fmt: skip
     return table
 
 
@@ -127,12 +127,12 @@ def saving_rows(rows: list[dict]) -> list[list[str]]:
     named[0:0] = [("every descriptor varies", "descriptors that do not vary keep their mean"),
                   ("coefficients of 32 bits", "coefficients of few bits")]  # fmt: skip
     for setting, said in named:
-        figures = found.get(setting)
-        if shipped and figures:
+        metrics = found.get(setting)
+        if shipped and metrics:
             # Bytes of what the scene as shipped has, however many points the other stores.
-            less = (shipped["bytes"] - figures["bytes"]) / shipped["points"]
-            table.append([said, _change(less, 1), _change(shipped["frame_ms"] - figures["frame_ms"], 2),
-                          _change(figures["psnr_db"] - shipped["psnr_db"], 3)])  # fmt: skip
+            less = (shipped["bytes"] - metrics["bytes"]) / shipped["points"]
+            table.append([said, _change(less, 1), _change(shipped["frame_ms"] - metrics["frame_ms"], 2),
+                          _change(metrics["psnr_db"] - shipped["psnr_db"], 3)])  # fmt: skip
     return table
 
 

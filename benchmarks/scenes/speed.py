@@ -24,7 +24,7 @@ VIEWS, LONG_SIDE_PX = 24, 640
 CLOUDS = (50_000, 100_000, 200_000, 250_000, 500_000, 700_000, 1_000_000)
 QUICK_CLOUDS = (50_000, 200_000)
 SIZES = ((160, 120), (320, 240), (640, 480), (1280, 960))
-GATE_SIZE, GATE_POINTS = (640, 480), 500_000
+TARGET_SIZE, TARGET_POINTS = (640, 480), 500_000
 SMALL_SIZE, SMALL_POINTS = (320, 240), 200_000
 
 
@@ -53,7 +53,7 @@ def dense_cloud(place: Place, points: int, seed: int = 0) -> tuple[np.ndarray, n
 
 
 def chosen_place(folders: list[Path]) -> Place | None:
-    """The first with photos of 640 x 480, lying or upright, and as many source photos as the gate asks for; a room if
+    """The first with photos of 640 x 480, lying or upright, and as many source photos as the target asks for; a room if
     there is one."""
     found = []
     for folder in folders:
@@ -61,7 +61,7 @@ def chosen_place(folders: list[Path]) -> Place | None:
             place = load_place(folder)
         except PlaceError:
             continue  # quality.py says what is wrong with it
-        if is_size((place.images.width, place.images.height), GATE_SIZE) and len(place.source) >= VIEWS:
+        if is_size((place.images.width, place.images.height), TARGET_SIZE) and len(place.source) >= VIEWS:
             found.append(place)
     return min(found, key=lambda place: place.about.get("kind") != "room") if found else None
 
@@ -112,8 +112,8 @@ def measure(folders: list[Path], networks: Path, threads: int, quick: bool) -> t
 
 def wanted_frames(all_sizes: bool, threads: int) -> list[tuple[tuple[int, int], int]]:
     """Size and threads of the frames that are timed."""
-    wanted = [(size, threads) for size in (SIZES if all_sizes else (SMALL_SIZE, GATE_SIZE))]
-    return wanted + [(GATE_SIZE, 1)] if threads != 1 else wanted
+    wanted = [(size, threads) for size in (SIZES if all_sizes else (SMALL_SIZE, TARGET_SIZE))]
+    return wanted + [(TARGET_SIZE, 1)] if threads != 1 else wanted
 
 
 def place_cloud(place: Place) -> str:
@@ -126,26 +126,26 @@ def built_row(asked: int, built: Built) -> dict:
             "bytes_a_point": built.bytes / built.points}  # fmt: skip
 
 
-def figures_of(measured: dict) -> tuple[dict[str, float], dict[str, str]]:
-    """The figures that are gates, and why others are missing. A frame's is that of the smallest scene with at least the
-    points the gate asks for."""
-    figures, missing = {}, {}
-    for name, size, least in (("scene_fps_500k", GATE_SIZE, GATE_POINTS), ("scene_fps_200k_small", SMALL_SIZE,
+def metrics_of(measured: dict) -> tuple[dict[str, float], dict[str, str]]:
+    """Returns the metrics with a target, and why others are missing. Frame rates come from the smallest scene with at
+    least as many points as the target names."""
+    metrics, missing = {}, {}
+    for name, size, least in (("scene_fps_500k", TARGET_SIZE, TARGET_POINTS), ("scene_fps_200k_small", SMALL_SIZE,
                                                                             SMALL_POINTS)):  # fmt: skip
         rows = [row for row in measured["frames"] if tuple(row["size_px"]) == size and row["points"] >= least
                 and row["threads"] == measured["threads"]]  # fmt: skip
         if rows:
-            figures[name] = 1000 / min(rows, key=lambda row: row["points"])["ms"]["total"]
+            metrics[name] = 1000 / min(rows, key=lambda row: row["points"])["ms"]["total"]
         else:
             missing[name] = f"no scene kept {least:,} points and was rendered at {size[0]} x {size[1]}"
     by_cloud = {row["cloud"]: row for row in measured["built"]}
-    for name, cloud, key in (("scene_build_s", GATE_POINTS, "build_s"), ("scene_peak_memory_mb", 1_000_000,
+    for name, cloud, key in (("scene_build_s", TARGET_POINTS, "build_s"), ("scene_peak_memory_mb", 1_000_000,
                                                                          "peak_memory_mb")):  # fmt: skip
         if cloud in by_cloud:
-            figures[name] = by_cloud[cloud][key]
+            metrics[name] = by_cloud[cloud][key]
         else:
             missing[name] = measured["missing"].get(f"{cloud:,} points", f"no cloud of {cloud:,} points was modelled")
-    return figures, missing
+    return metrics, missing
 
 
 def memory_a_point(measured: dict) -> float | None:

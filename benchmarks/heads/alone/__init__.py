@@ -1,1 +1,0 @@
-"""Measurements of heads that are commands of their own."""

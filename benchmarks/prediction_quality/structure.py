@@ -1,0 +1,46 @@
+"""SSIM of what is predicted of a clip, by method and time ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import maquette
+import numpy as np
+
+from benchmarks.concealment import FIRST_START, START_STEP
+from benchmarks.prediction_quality.dis import Dis
+from export.scenes.picture_quality import ssim
+
+START_STEP_OF_SSIM = 2 * START_STEP  # it takes longer than the predictions
+
+
+MENDED = 1  # MAQ_NETWORK_MENDED
+
+
+def structure_of(
+    bgr: np.ndarray, fps: float, horizons: Sequence[int], bundle: Path, threads: int = 1
+) -> dict[str, list[float]]:
+    """Of frames BGR uint8 [T, H, W, 3]: by method the mean SSIM of the pictures so many frames after the one that was
+    seen last. bundle: of the network that mends."""
+    predictors = {name: maquette.Predictor(name, threads=threads) for name in ("last", "motion", "auto")}
+    predictors["network"] = maquette.Predictor("network", network_mode=MENDED, bundle_path=bundle, threads=threads)
+    rgb = np.ascontiguousarray(bgr[..., ::-1])
+    dis = Dis(*bgr.shape[1:3])
+    found: dict[str, list[list[float]]] = {name: [] for name in (*predictors, "dis")}
+    for t in range(len(bgr) - max(horizons)):
+        frame = maquette.Frame(rgb[t], timestamp_ns=round(t * 1e9 / fps))
+        for predictor in predictors.values():
+            predictor.push(frame)
+        if t < FIRST_START or (t - FIRST_START) % START_STEP_OF_SSIM:
+            continue
+        truth = [rgb[t + horizon] / 255 for horizon in horizons]
+        pictures = {
+            name: [predictor.predict(horizon / fps).pixels() for horizon in horizons]
+            for name, predictor in predictors.items()
+        }
+        to_before = dis.motion(bgr[t], bgr[t - 1])
+        pictures["dis"] = [dis.moved(rgb[t], to_before, horizon) for horizon in horizons]
+        for name, made in pictures.items():
+            found[name].append([ssim(picture / 255, true) for picture, true in zip(made, truth, strict=True)])
+    return {name: np.mean(rows, 0).tolist() for name, rows in found.items()}

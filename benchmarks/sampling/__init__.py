@@ -1,0 +1,11 @@
+"""What the transformer draws of coming frames, beside the last frame and motion."""
+
+OF_TIMES = ("four_samples_times", "sampled_frames_a_second", "passes_frames_a_second", "recomputing_times")
+METRICS = (
+    "sampled_mean_gain_db",
+    "refined_gain_db",
+    "uncertainty_rank",
+    "sampled_frechet_ratio",
+    "refined_frechet_ratio",
+    *OF_TIMES,
+)

@@ -1,0 +1,85 @@
+"""Clips that go on from their first frames by each method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import maquette
+import numpy as np
+from tqdm import tqdm
+
+from export.prediction.data import Clips
+
+GIVEN, MADE = 5, 11  # frames of a clip, as the published system has them
+SAMPLES = 16
+PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # of what is drawn with few samples; 1 has SAMPLES
+MENDED, DRAWN = 1, 3  # MAQ_NETWORK_MENDED, MAQ_NETWORK_DRAWN
+SEED = 1
+
+# Frames of a clip [GIVEN, H, W, 3], seconds between them -> pictures [samples, MADE, H, W, 3], and bits of their cells
+# [samples, MADE, 16, 16] or None.
+Method = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray | None]]
+
+
+def shown(predictor: maquette.Predictor, frames: np.ndarray, step_s: float) -> None:
+    predictor.reset()
+    for k, frame in enumerate(frames):
+        predictor.push(np.ascontiguousarray(frame), k * step_s)
+
+
+def foreseen(name: str, **settings: object) -> Method:
+    """By a method that draws nothing."""
+    predictor = maquette.Predictor(method=name, threads=1, **settings)
+
+    def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, None]:
+        shown(predictor, frames, step_s)
+        return np.stack([predictor.predict(k * step_s).pixels() for k in range(1, MADE + 1)])[None], None
+
+    return go_on
+
+
+def drawn(samples: int, bundle: Path, **settings: float) -> Method:
+    """settings: temperature, top_k, passes."""
+    predictor = maquette.Predictor(
+        method="network", network_mode=DRAWN, bundle_path=bundle, threads=1, seed=SEED, **settings
+    )
+
+    def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        shown(predictor, frames, step_s)
+        predictor.draw(samples, MADE, step_s)
+        numbers = range(1, MADE + 1)
+        # Of one time after another: what is the same for all samples is then made once.
+        pictures = np.stack([[predictor.drawn(s, k).pixels() for s in range(samples)] for k in numbers], 1)
+        return pictures, np.stack([[predictor.uncertainty(s, k) for k in numbers] for s in range(samples)])
+
+    return go_on
+
+
+def methods(bundle: Path, samples: int) -> dict[str, Method]:
+    return {
+        "last frame": foreseen("last"),
+        "motion": foreseen("motion"),
+        "auto": foreseen("auto"),
+        "auto, refined": foreseen("network", network_mode=MENDED, bundle_path=bundle),
+        "likeliest": drawn(1, bundle, temperature=0),
+        "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
+        **{f"likeliest, {passes} passes": drawn(1, bundle, temperature=0, passes=passes) for passes in PASSES},
+        **{f"temperature {value:g}": drawn(4, bundle, temperature=value) for value in TEMPERATURES},
+        "temperature 1": drawn(samples, bundle, temperature=1),
+    }
+
+
+def went_on(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """By method: pictures uint8 [clips, samples, MADE, H, W, 3], and where there are some bits of cells [clips,
+    samples, MADE, 16, 16]."""
+    pictures: dict[str, list[np.ndarray]] = {}
+    bits: dict[str, list[np.ndarray]] = {}
+    known = methods(bundle, samples)
+    for frames, fps in tqdm(zip(clips.frames.numpy(), clips.fps.numpy(), strict=True), total=len(clips), disable=None):
+        for name, go_on in known.items():
+            made, uncertain = go_on(frames[:GIVEN], 1 / float(fps))
+            pictures.setdefault(name, []).append(made)
+            if uncertain is not None:
+                bits.setdefault(name, []).append(uncertain)
+    return {k: np.stack(v) for k, v in pictures.items()}, {k: np.stack(v) for k, v in bits.items()}

@@ -42,7 +42,7 @@ of six views 30° to 60° around from the photo, in its light, before grey; of t
 camera, and where the photo does not see it the colour of the nearest place that it does. *By features*: how far
 features of the person detector's trunk differ, relative to their size, averaged over four layers (lower is better);
 in the manner of LPIPS, without anybody's judgement in it. NeuS from a sphere takes minutes and is not
-among them (its errors are in docs/heads.md; its program is at the tag studies-0.2)."""
+among them (its errors are in docs/research/heads.md; its program is at the tag studies-0.2)."""
 
 _REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
 mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted

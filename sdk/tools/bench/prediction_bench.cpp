@@ -28,7 +28,7 @@ constexpr double kMibibytes = 1024.0 * 1024.0;
 constexpr size_t kShownFirst = 6, kMeasuredInBlock = 10;
 constexpr double kBlockMs = 300;
 constexpr int32_t kNetworkSidePx = 64;  // of the square that networks see
-constexpr uint32_t kFramesDrawn = 11;   // as benchmarks/drawn has them
+constexpr uint32_t kFramesDrawn = 11;   // as benchmarks/sampling
 constexpr double kMaxStepS = 0.125;     // of maq_predictor_draw
 
 using Clock = std::chrono::steady_clock;

@@ -1,4 +1,4 @@
-// `maquette scene` as a person meets it, and as benchmarks/scene_command.py does: files, figures, sentences, Ctrl-C.
+// `maquette scene` as a person meets it, and as benchmarks/scenes/command.py does: files, figures, sentences, Ctrl-C.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -73,6 +73,7 @@ if wants test isa camera-vm lint android newcomer; then
     needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras
     needs_package python3-venv
     needs_package python3-dev
+    needs_command strace strace       # shows that nothing is sent anywhere
     needs_package libegl1             # moderngl draws without a window through EGL
     needs_package libgl1
     needs_package libgl1-mesa-dri     # ... on the processor (llvmpipe)

@@ -1,8 +1,8 @@
-# Runs the commands that README.md has for its C program, as they stand there, in a folder with the build and the tests,
+# Runs the commands that docs/guide/link.md has for its C program, as they stand there, in a folder with the build and the tests,
 # and with a home of its own: cmake -DSOURCE_DIR=… -DBUILD_DIR=… -DWORK_DIR=… -P run_readme.cmake
-file(READ "${SOURCE_DIR}/README.md" readme)
+file(READ "${SOURCE_DIR}/docs/guide/link.md" readme)
 if(NOT readme MATCHES "\n    cmake --install [^\n]*\n(    [^\n]*\n)+")
-  message(FATAL_ERROR "README.md has no commands that begin with cmake --install.")
+  message(FATAL_ERROR "docs/guide/link.md has no commands that begin with cmake --install.")
 endif()
 string(REGEX REPLACE "\n    " "\n" commands "${CMAKE_MATCH_0}")
 file(REMOVE_RECURSE "${WORK_DIR}")

@@ -1,14 +1,14 @@
-"""Commands of README.md, in order, and what the test knows of them."""
+"""Commands of README.md and of the guide to linking, in order, and what the test knows of them."""
 
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
+PAGES = ("README.md", "docs/guide/link.md")
+
 # Left out, with the reason that is printed.
 LEFT_OUT = {
     "make test": "continuous integration runs it",
-    "scripts/make-venv.sh train,": "training takes hours",
-    "python -m": "training takes hours",
 }
 
 # Run until the reader presses Ctrl-C: text of the command, and the seconds that the reader looks at it.
@@ -23,6 +23,7 @@ PROMISES = {
     "make demo": "demo-output/*.png",
     "densepose photo.jpg": "results/photo_IUV.png",
     "densepose clip.mp4": "results/clip*_IUV.png",
+    "maquette edges": "results/box_depth_edges.json",
     "scene build": "room.maqs",
     "head photo.jpg": "head.glb",
     "scene render": "room.mp4",
@@ -83,4 +84,4 @@ def _block(heading: str, lines: list[str]) -> Block:
 
 
 def readme_blocks(root: Path) -> list[Block]:
-    return command_blocks((root / "README.md").read_text())
+    return [block for page in PAGES for block in command_blocks((root / page).read_text())]

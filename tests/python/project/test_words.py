@@ -1,9 +1,10 @@
-"""One language: the field's words, and none of the private ones that they replaced."""
+"""One language: the field's words, none of the private ones that they replaced, and sentences that are read once."""
 
 import re
 import subprocess
 from pathlib import Path
 
+import plain_english
 import pytest
 
 EVERYWHERE = ("sdk", "desktop_demo", "export", "quantization", "benchmarks", "tests", "docs", "scripts", "README.md",
@@ -18,7 +19,7 @@ HERE = Path("tests/python/project/test_words.py")
 # (pattern, the field's word, where to look). Words are matched as written, so `\\b` and case matter.
 WORDS = [
     # Descriptors of points, in place of "looks".
-    (r"\blooks_(?!like|at)\w+|\w+_looks\b|\bLook[A-Z]\w*|\b\w*[a-z]Looks?\b", "descriptor", EVERYWHERE),
+    (r"\blooks_(?!like|at)\w|(?<=\w)_looks\b|\bLook[A-Z]|(?<=[a-z])Looks?\b", "descriptor", EVERYWHERE),
     (r"\bhow (it|they|the points|points) looks?\b", "descriptors", NATIVE),
     (r"\bwild\b|\bwild_\w+|\bWild[A-Z]\w*", "outlier", EVERYWHERE),
     (r"[Mm]odelled_?[Pp]oints|[Mm]odelling_?[Ss]tate", "fitted points, state of fitting", EVERYWHERE),
@@ -27,22 +28,22 @@ WORDS = [
     (r"PointPlaces?|place_kind|PlaceKind|PlaceInPicture|\bplaces_bytes\b", "position", EVERYWHERE),
     (r"\bturn_in\b", "givens_rotate", EVERYWHERE),
     (
-        r"\bturned_\w+|\bTurned[A-Z]\w*|\bturning_\w+|\bturn_ms\b|\w+_turn_?[sn]s\b",
+        r"\bturned_\w+|\bTurned[A-Z]\w*|\bturning_\w+|\bturn_ms\b|(?<=\w)_turn_?[sn]s\b",
         "rotated, aligned; iteration",
         NATIVE,
     ),
     (r"[Uu]pright_?[Ff]rame", "gravity alignment", EVERYWHERE),
     (r"\bis_folded\b", "is_space_to_depth", EVERYWHERE),
-    (r"\w*Reach_px\b|\breach_px\b", "receptive field radius", EVERYWHERE),
+    (r"Reach_px\b|\breach_px\b", "receptive field radius", EVERYWHERE),
     # What is visible.
-    (r"[Pp]icture_?[Cc]over\b|\w*[Ss]ureness\w*|_SURENESS", "coverage, confidence", EVERYWHERE),
+    (r"[Pp]icture_?[Cc]over\b|[Ss]ureness|_SURENESS", "coverage, confidence", EVERYWHERE),
     (r"k?[Hh]iding_?[Ss]hare|\bunhidden\b|\bshines? through\b", "occlusion, depth tolerance", EVERYWHERE),
     (r"\b(who )?wins? (a|the|its|their|each|every|that) pixels?\b", "is front-most at, is visible at", EVERYWHERE),
     # Amounts.
     (r"\b_?least_(?!squares)\w+|\bkLeast\w*|\b_?LEAST_\w+", "min", EVERYWHERE),
     (r"\b_?most_[a-z]\w*|\bkMost\w*|\b_?MOST_\w+", "max", EVERYWHERE),
     (
-        r"\b[a-z]\w*_shares?\b|\bshares?_[a-z]\w*|\bk[A-Z]\w*Share\b|\b[A-Z_]+_SHARE\b",
+        r"(?<=[a-z])_shares?\b|\bshares?_[a-z]|(?<=[a-z])Share\b|(?<=[A-Z])_SHARE\b",
         "fraction, ratio, rate",
         EVERYWHERE,
     ),
@@ -66,7 +67,7 @@ WORDS = [
     (r"\bdrop_counts\b|\bsentence_part\b", "import report", NATIVE),
     # Objects that are lent and asked for.
     (r"\bhand_out\b|\btake_back\b", "lend, return", EVERYWHERE),
-    (r"\b[A-Z]\w*Wish\b|\bWish\b|\bstruct Orders\b|\bOrders\b", "request, command", NATIVE),
+    (r"Wish\b|\bstruct Orders\b|\bOrders\b", "request, command", NATIVE),
     (r"\b(T|bool|u?int\d*(_t)?|float|double|string&?|Value&?) otherwise[,)]", "fallback", NATIVE),
     (r"\bplayed_camera\b|\bplayed as cameras?\b", "replay", EVERYWHERE),
     (r"\b(struct|class) Figures\b", "parameters, metrics", NATIVE),
@@ -86,36 +87,72 @@ WORDS = [
 ]
 
 # Texts of others, and figures as a run wrote them.
-SKIPPED = ("sdk/licenses/", "desktop_demo/licenses/", "docs/benchmarks/", "docs/research/progress.json", "docs/research/ablation.json")
+SKIPPED = (
+    "sdk/licenses/",
+    "desktop_demo/licenses/",
+    "docs/benchmarks/",
+    "docs/research/progress.json",
+    "docs/research/ablation.json",
+)
 # Where a pattern finds what means something else: (file, line) as regular expressions, each with its reason.
 EXCEPTIONS = [
     (r"quantization", r"\bshare_scales\b"),  # shares: is in common
 ]
 
 
-def lines() -> list[tuple[str, int, str]]:
-    """(file, number, text) of every line of what the repository holds."""
+def texts() -> dict[str, str]:
+    """Every text of the repository, by the name of its file."""
     listed = subprocess.run(["git", "ls-files", *EVERYWHERE], capture_output=True, text=True, check=True).stdout
     paths = [Path(name) for name in listed.splitlines()
              if name.endswith(TEXT) and not name.startswith(SKIPPED) and Path(name) != HERE]  # fmt: skip
-    return [
-        (path.as_posix(), number, line)
-        for path in paths
-        if path.is_file()
-        for number, line in enumerate(path.read_text().splitlines(), 1)
-    ]
+    return {path.as_posix(): path.read_text() for path in paths if path.is_file()}
 
 
-LINES = lines()
+TEXTS = texts()
 
 
 @pytest.mark.parametrize(("pattern", "word", "where"), WORDS, ids=[word for _, word, _ in WORDS])
 def test_no_private_word_comes_back(pattern, word, where):
-    found = re.compile(pattern)
-    wrong = [
-        f"{file}:{number}: '{match[0]}'; say: {word}"
-        for file, number, line in LINES
-        if file.startswith(where) and (match := found.search(line))
-        if not any(re.search(path, file) and re.search(text, line) for path, text in EXCEPTIONS)
-    ]
+    found = re.compile(pattern, re.MULTILINE)
+    wrong = []
+    for file, text in TEXTS.items():
+        for match in found.finditer(text) if file.startswith(where) else ():
+            line = text[text.rfind("\n", 0, match.start()) + 1 : text.find("\n", match.end())]
+            if not any(re.search(path, file) and re.search(excused, line) for path, excused in EXCEPTIONS):
+                wrong.append(f"{file}:{text.count(chr(10), 0, match.start()) + 1}: '{match[0]}'; say: {word}")
     assert not wrong, "\n".join(["", *wrong])
+
+
+def test_sentences_are_short_and_name_the_noun():
+    """Exceptions are those of `language_exceptions.txt`, which may only shrink."""
+    found, allowed = plain_english.counted(), plain_english.listed()
+    more = {name: found[name] - allowed[name] for name in sorted(found) if found[name] - allowed[name]}
+    assert not more, "\n".join(
+        [
+            "Sentences are long (over 25 words in headers and help, 30 in docs), a comment begins with Of, What, Those",
+            "or Whose, or a phrase such as 'likewise' is used. Show them:",
+            "python tests/python/support/plain_english.py FILE...",
+            f"After a file was moved, move its line in {plain_english.EXCEPTIONS}.",
+            *(f"{name}: {dict(kinds)}" for name, kinds in more.items()),
+        ]
+    )
+    fewer = [name for name in allowed if allowed[name] - found[name]]
+    assert not fewer, "\n".join(
+        ["Better than listed. Run: python tests/python/support/plain_english.py --lower", *fewer]
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "kinds"),
+    [
+        ("a.cpp", "int a;  // Of a frame.\n// Returns b.\n// Of the next line this is no comment.\n", ["opening"]),
+        ("a.py", 'def a():\n    """What it is."""\n    # Those\n    return "Of"\n', ["opening", "opening"]),
+        ("a.md", "It is likewise what is aimed at, as X has it.\n", ["phrase"] * 3),
+        ("README.md", "one " * 31 + "\n\n| " + "one " * 30 + "|\n\n    " + "one " * 31, ["long"]),
+        ("README.md", "one " * 20 + "end. " + "two " * 20 + "`a.b c`. " + "three " * 20, []),
+        ("sdk/include/maquette/a.h", "/* " + "one\n * " * 26 + "*/ int a; /* b */", ["long"]),
+        ("sdk/tools/a.cpp", 'f("' + "one " * 20 + '"\n  "' + "two " * 6 + '"); // ' + "three " * 30, ["long"]),
+    ],
+)
+def test_each_rule_finds_its_sentences(path, text, kinds):
+    assert [kind for _, kind, _ in plain_english.faults(path, text)] == kinds

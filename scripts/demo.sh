@@ -2,8 +2,8 @@
 # Runs the built SDK on the bundled photo (people, a head of one), clip, depth picture and room, and on a real place:
 # scripts/demo.sh [OUTPUT_FOLDER]
 #
-# The real place is fetched once (box, or what is in .data/places/real), which needs Python 3.11 and some minutes; without a
-# network the demo says so and goes on. REAL=no leaves it out.
+# The capture of a real object is fetched once (box, or the captures in .data/places/real). That needs Python 3.11, a
+# network and some minutes. Without a network the demo says so and goes on; REAL=no leaves the capture out.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out="${1:-demo-output}"
@@ -37,14 +37,20 @@ printf "\n== maquette edges '%s' --out %s --overlay --boxes --format json,step,d
 "$maquette" edges "$depth" --out "$out" --overlay --boxes --format json,step,dxf
 echo "  in truth    441 x 427 x 411 mm (tests/media/box_depth.json)"
 
-# A real place takes a while to come, so the bundled one is shown first.
+# Fetches a capture of a real object, unless one is there. Returns 1 when there is none to show: with REAL=no, and
+# without a network. Any other failure ends the demo with an error.
 fetch_real() {
-    [ "${REAL:-yes}" != no ] || { echo "REAL=no: no real place"; return 1; }
+    local status=0
+    [ "${REAL:-yes}" != no ] || { echo "REAL=no: no capture of a real object"; return 1; }
     compgen -G "$places/*/transforms.json" >/dev/null && return 0
     printf '\n== python -m export.captures fetch box\n'
-    scripts/make-venv.sh captures && .venv/bin/python -m export.captures fetch box && return 0
-    echo "No real place could be fetched, so only the rendered room is shown. Later, with a network:"
-    echo "  scripts/make-venv.sh captures && .venv/bin/python -m export.captures fetch box && make demo"
+    { scripts/make-venv.sh captures && .venv/bin/python -m export.captures fetch box; } || status=$?
+    [ $status -ne 0 ] || return 0
+    if [ $status -ne 69 ]; then
+        echo "The capture of a real object could not be made (exit status $status). REAL=no leaves it out." >&2
+        exit $status
+    fi
+    echo "There is no network, so only the rendered room is shown. With a network, run make demo again."
     return 1
 }
 

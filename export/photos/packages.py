@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -25,8 +26,19 @@ FOLDER = Path(__file__).parent
 ARCHIVES = Path(".deps/photos")
 
 
+# Messages of pip, npm and apt-get when no server can be reached.
+UNREACHABLE = re.compile(
+    r"NewConnectionError|ConnectTimeout|ReadTimeout|name resolution|Network is unreachable|Cannot connect to proxy"
+    r"|ENOTFOUND|EAI_AGAIN|ECONNREFUSED|ENETUNREACH|ETIMEDOUT|Could not resolve|Could not connect"
+)
+
+
 class PackageError(RuntimeError):
-    """A package could not be had, or is not what `packages.toml` says."""
+    """A package cannot be fetched, or differs from its entry in `packages.toml`."""
+
+
+class NetworkError(PackageError):
+    """The server of a package cannot be reached."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +114,8 @@ def _download(package: Package, folder: Path) -> None:
     if done.returncode and not (folder / package.file).exists():
         reason = (done.stderr or done.stdout).strip().splitlines()[-3:]
         hint = " If apt does not know it, run `apt-get update` first." if command[0] == "apt-get" else ""
-        raise PackageError(f"{wanted} could not be fetched: {' '.join(reason)}{hint}")
+        kind = NetworkError if UNREACHABLE.search(done.stderr + done.stdout) else PackageError
+        raise kind(f"{wanted} could not be fetched: {' '.join(reason)}{hint}")
 
 
 def _source_command(wanted: str, folder: Path) -> list[str]:

@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CLONE = "maquette"
 SYSTEM = ROOT / "build/newcomer/system"  # of no one's choice: it is deleted as a whole
 LIMIT_S = 1800  # of a block that ends by itself
+TEST_LIMIT_S = 5400  # of a block that builds the tests, too
 BUILD_LIMIT_S = 900  # until a block that runs until Ctrl-C has begun: the demo is built first
 END_LIMIT_S = 20  # from Ctrl-C to the end
 SCREEN = (1280, 1024)
@@ -85,11 +86,27 @@ def look_and_interrupt(process: subprocess.Popen, block: Block, window: Path, sh
     return []
 
 
+def wait_for_words(process: subprocess.Popen, pattern: str, output: Path) -> list[str]:
+    """Waits until `output` has a match of `pattern`, and ends the process; returns what went wrong."""
+    end = time.monotonic() + TEST_LIMIT_S
+    while not re.search(pattern, output.read_text(errors="replace")):
+        if process.poll() is not None:
+            return [f"ended with exit code {process.returncode} before it printed anything like {pattern}"]
+        if time.monotonic() > end:
+            return [f"printed nothing like {pattern} within {TEST_LIMIT_S} s"]
+        time.sleep(1)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    return []
+
+
 def run_block(system: BareSystem, block: Block, output: Path, display: str, window: Path) -> list[str]:
     """What went wrong with `block`; nothing if it went as the README says."""
     with system.running(block.script, CLONE, output, display) as process:
         if block.seconds_until_interrupted is not None:
             problems = look_and_interrupt(process, block, window, output.with_name("screen.xwd"))
+        elif block.last_words is not None:
+            problems = wait_for_words(process, block.last_words, output)
         else:
             try:
                 code = process.wait(LIMIT_S)
@@ -109,12 +126,6 @@ def follow(system: BareSystem, out: Path) -> int:
     ran = failed = 0
     with screen(out) as display:
         for number, block in enumerate(readme_blocks(system.home / CLONE), 1):
-            for why in dict.fromkeys(why for _, why in block.left_out):
-                lines = [line.split("  #")[0].strip() for line, reason in block.left_out if reason == why]
-                more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
-                print(f"left out    {lines[0][:80]}{more} ({why})")
-            if not block.lines:
-                continue
             output = out / f"{number:02}.txt"
             begin = time.monotonic()
             problems = run_block(system, block, output, display, out / "Xvfb_screen0")

@@ -6,13 +6,12 @@ from pathlib import Path
 
 PAGES = ("README.md", "docs/guide/link.md")
 
-# Left out, with the reason that is printed.
-LEFT_OUT = {
-    "make test": "continuous integration runs it",
-}
-
 # Run until the reader presses Ctrl-C: text of the command, and the seconds that the reader looks at it.
 UNTIL_INTERRUPTED = {"make desktop-demo": 15, "maquette play": 5}
+
+# Ended early: text of the command, and a pattern of the output after which it is ended. The groups of tests that follow
+# run in continuous integration.
+UNTIL_PRINTED = {"make test": r"(?m)^# [\w-]+ passed in \d+ s"}
 
 # What the reader has beforehand, under the names that the README uses: name in the README, file of the clone.
 READERS_FILES = {"photo.jpg": "tests/media/photo.jpg", "clip.mp4": "tests/media/clip.mp4"}
@@ -38,8 +37,7 @@ class Block:
     """Commands that share a shell: lines of a README that follow each other, indented by four spaces."""
 
     heading: str
-    lines: tuple[str, ...]  # without those left out
-    left_out: tuple[tuple[str, str], ...]  # line, reason
+    lines: tuple[str, ...]
 
     @property
     def script(self) -> str:
@@ -49,6 +47,11 @@ class Block:
     def seconds_until_interrupted(self) -> int | None:
         """How long it runs until Ctrl-C; None if it ends by itself."""
         return next((seconds for text, seconds in UNTIL_INTERRUPTED.items() if text in self.script), None)
+
+    @property
+    def last_words(self) -> str | None:
+        """A pattern of the output after which it is ended; None if it ends by itself."""
+        return next((pattern for text, pattern in UNTIL_PRINTED.items() if text in self.script), None)
 
     @property
     def promises(self) -> list[str]:
@@ -64,23 +67,14 @@ def command_blocks(readme: str) -> list[Block]:
             lines.append(line[4:])
             continue
         if lines:
-            blocks.append(_block(heading, lines))
+            commands = re.sub(r"\\\n\s*", "", "\n".join(lines)).splitlines()
+            blocks.append(Block(heading, tuple(commands)))
             lines = []
         if line.startswith("```"):
             is_fenced = not is_fenced
         elif line.startswith("#") and not is_fenced:
             heading = line.lstrip("# ")
     return blocks
-
-
-def _block(heading: str, lines: list[str]) -> Block:
-    commands = re.sub(r"\\\n\s*", "", "\n".join(lines)).splitlines()
-    reasons = [next((why for text, why in LEFT_OUT.items() if line.startswith(text)), None) for line in commands]
-    return Block(
-        heading,
-        tuple(line for line, why in zip(commands, reasons, strict=True) if why is None),
-        tuple((line, why) for line, why in zip(commands, reasons, strict=True) if why is not None),
-    )
 
 
 def readme_blocks(root: Path) -> list[Block]:

@@ -30,7 +30,7 @@ class BuildWithLibrary(build_py):
         (target / "lib").mkdir(exist_ok=True)
         shutil.copyfile(library, target / "lib/libmaquette.so")
         shutil.copytree(installed / "lib/maquette", target / "lib/maquette", dirs_exist_ok=True)
-        for share in ("models", "licenses"):
+        for share in ("models", "licenses", "stub"):
             place = f"share/maquette/{share}"
             shutil.copytree(installed / place, target / place, dirs_exist_ok=True)
         for needed in _jpeg_libraries(library):

@@ -1,7 +1,7 @@
 """Draws the walking people that the SDK's `stub:people` source shows: one sheet of RGBA tiles.
 
-    python -m export.people.sprites --out sdk/assets/stub_people.jpg                      # other people than now
-    python -m export.people.sprites --sheet SHEET --out sdk/assets/stub_people.jpg        # a sheet drawn before
+    python -m export.people.sprites --out sdk/assets/stub/people.jpg                      # other people than now
+    python -m export.people.sprites --sheet SHEET --out sdk/assets/stub/people.jpg        # a sheet drawn before
 
 Rows are people of the test split, columns the frames of one walk cycle; a tile is 128 x 256 pixels, feet near
 its lower edge, the person walking towards the right. Who is drawn follows from the wardrobe and the bodies as they are
@@ -77,7 +77,7 @@ def drawn_sheet(places: Path) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("sdk/assets/stub_people.jpg"), help="the mask goes beside it")
+    parser.add_argument("--out", type=Path, default=Path("sdk/assets/stub/people.jpg"), help="the mask goes beside it")
     parser.add_argument("--sheet", type=Path, help="an image of the tiles with alpha, instead of drawing some")
     parser.add_argument("--quality", type=int, default=71, help="of the JPEG")
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")

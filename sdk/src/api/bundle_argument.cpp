@@ -1,7 +1,5 @@
 #include "api/bundle_argument.h"
 
-#include <unistd.h>
-
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,14 +10,10 @@
 namespace maq {
 namespace {
 
-// The library may lie in lib/ or, as on Debian, in lib/<architecture>/.
 Bundle read_installed_bundle(const std::string& config, const std::string& name) {
-  const std::string library = library_folder();
-  for (const char* up : {"../", "../../"}) {
-    const std::string folder = concatenate(library, up, "share/maquette/models/", name);
-    if (access((folder + "/manifest.json").c_str(), F_OK) == 0) return read_bundle(folder);
-  }
-  throw Error(MAQ_ERROR_NOT_FOUND, config, ".bundle_path is NULL, but ", library, "../share/maquette/models/", name,
+  const std::string folder = concatenate("models/", name), manifest = find_shared_file(folder + "/manifest.json");
+  if (!manifest.empty()) return read_bundle(find_shared_file(folder));
+  throw Error(MAQ_ERROR_NOT_FOUND, config, ".bundle_path is NULL, but ", library_folder(), "../share/maquette/", folder,
               " does not exist; install the models with the library, or set bundle_path or bundle_files.");
 }
 

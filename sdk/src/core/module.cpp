@@ -27,6 +27,15 @@ std::string library_folder() {
   return slash == std::string::npos ? "./" : file.substr(0, slash + 1);
 }
 
+std::string find_shared_file(const std::string& name) {
+  const std::string library = library_folder();
+  for (const char* up : {"../", "../../"}) {
+    std::string path = concatenate(library, up, "share/maquette/", name);
+    if (access(path.c_str(), F_OK) == 0) return path;
+  }
+  return "";
+}
+
 std::string module_path(const char* file) { return library_folder() + "maquette/" + file; }
 
 LibraryOpening open_library(const std::string& path) {

@@ -25,6 +25,10 @@ struct ModuleExport {
 // does not tell.
 std::string library_folder();
 
+// Returns the path of a file or folder of share/maquette, such as "stub/people.jpg": in share/ beside the library's
+// lib/, or beside lib/<architecture>/, as on Debian. "" where it does not exist.
+std::string find_shared_file(const std::string& name);
+
 // The path of a module: in maquette/ beside this copy of the SDK.
 std::string module_path(const char* file);
 

@@ -4,16 +4,20 @@
 #include <array>
 
 #include "core/error.h"
+#include "core/files/file.h"
+#include "core/module.h"
 #include "image/files/jpeg.h"
 
 namespace maq {
 namespace {
 
+constexpr uint64_t kMaxSheetBytes = 16 << 20;
+
 // Alpha in quarters, each given its neighbours, by adaptive binary arithmetic coding (Witten, Neal and Cleary 1987,
 // "Arithmetic coding for data compression"). export/people/sprite_files.py does the same steps.
 class MaskReader {
  public:
-  explicit MaskReader(const EmbeddedFile& file) : file_(file) {
+  explicit MaskReader(const std::vector<uint8_t>& file) : file_(file) {
     probabilities_.fill(1u << 15);
     for (int i = 0; i < 4; ++i) shift_in();
   }
@@ -27,7 +31,7 @@ class MaskReader {
     }
   }
 
-  bool is_used_up() const { return position_ == file_.size_bytes; }
+  bool is_used_up() const { return position_ == file_.size(); }
 
  private:
   uint8_t read_value(uint16_t* probabilities) {
@@ -56,11 +60,11 @@ class MaskReader {
   void shift_in() {
     low_ <<= 8;
     high_ = high_ << 8 | 0xff;
-    value_ = value_ << 8 | (position_ < file_.size_bytes ? file_.bytes[position_] : 0);
+    value_ = value_ << 8 | (position_ < file_.size() ? file_[position_] : 0);
     ++position_;
   }
 
-  EmbeddedFile file_;
+  const std::vector<uint8_t>& file_;
   size_t position_ = 0;
   uint32_t low_ = 0, high_ = 0xffffffff, value_ = 0;
   std::array<uint16_t, 5 * 5 * 3 * 3 * 4> probabilities_;
@@ -68,11 +72,11 @@ class MaskReader {
 
 }  // namespace
 
-BgraImage decode_people_sheet(const EmbeddedFile& colours, const EmbeddedFile& mask) {
+BgraImage decode_people_sheet(const std::vector<uint8_t>& colours, const std::vector<uint8_t>& mask) {
   Frame decoded;
-  if (!JpegDecoder().decode(colours.bytes, colours.size_bytes, MAQ_MAX_PIXELS, decoded)) {
-    throw Error(MAQ_ERROR_UNREADABLE, "The colours of stub:people, ", colours.size_bytes,
-                " bytes, are no whole JPEG image; make them anew with export.people.sprites.");
+  if (!JpegDecoder().decode(colours.data(), colours.size(), MAQ_MAX_PIXELS, decoded)) {
+    throw Error(MAQ_ERROR_UNREADABLE, "The colours of stub:people, ", colours.size(),
+                " bytes, are not a complete JPEG image; install the file share/maquette/stub/people.jpg again.");
   }
   const int width = decoded.image.width_px, height = decoded.image.height_px;
   BgraImage sheet{width, height, std::vector<uint8_t>(size_t(width) * size_t(height) * 4)};
@@ -89,10 +93,20 @@ BgraImage decode_people_sheet(const EmbeddedFile& colours, const EmbeddedFile& m
     std::swap(above, row);
   }
   if (!reader.is_used_up()) {
-    throw Error(MAQ_ERROR_UNREADABLE, "The mask of stub:people, ", mask.size_bytes,
-                " bytes, is not that of its colours; make both anew with export.people.sprites.");
+    throw Error(MAQ_ERROR_UNREADABLE, "The mask of stub:people, ", mask.size(),
+                " bytes, does not fit its colours; install both files of share/maquette/stub again.");
   }
   return sheet;
+}
+
+BgraImage read_people_sheet() {
+  const std::string colours = find_shared_file("stub/people.jpg"), mask = find_shared_file("stub/people.mask");
+  if (colours.empty() || mask.empty()) {
+    throw Error(MAQ_ERROR_NOT_FOUND,
+                "stub:people needs share/maquette/stub/people.jpg and people.mask beside the library's ", "folder ",
+                library_folder(), "; install them, or use stub:pattern.");
+  }
+  return decode_people_sheet(read_file(colours, kMaxSheetBytes), read_file(mask, kMaxSheetBytes));
 }
 
 }  // namespace maq

@@ -1,21 +1,19 @@
-// The sprite sheet of stub:people, from the two files that CMake puts into the library (cmake/EmbedFile.cmake).
+// The sprite sheet of stub:people: two files in share/maquette/stub, which the command line and the tests have. Apps
+// need not carry them.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "image/sprite.h"
 
 namespace maq {
 
-struct EmbeddedFile {
-  const uint8_t* bytes = nullptr;
-  size_t size_bytes = 0;  // 0: this build has none
-};
-EmbeddedFile stub_people_colours();
-EmbeddedFile stub_people_mask();
+// Decodes the sheet. `colours`: a JPEG image. `mask`: its alpha, coded by export/people/sprite_files.py.
+// Throws MAQ_ERROR_UNREADABLE.
+BgraImage decode_people_sheet(const std::vector<uint8_t>& colours, const std::vector<uint8_t>& mask);
 
-// `colours`: a JPEG image. `mask`: its alpha, as export/people/sprite_files.py codes it. Throws MAQ_ERROR_UNREADABLE.
-BgraImage decode_people_sheet(const EmbeddedFile& colours, const EmbeddedFile& mask);
+// Reads and decodes the installed sheet. Throws MAQ_ERROR_NOT_FOUND where its files are not installed.
+BgraImage read_people_sheet();
 
 }  // namespace maq

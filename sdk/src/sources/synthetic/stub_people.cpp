@@ -42,13 +42,8 @@ std::vector<uint8_t> draw_room(int width, int height, Dice& dice) {
   return room;
 }
 
-BgraImage decode_sheet() {
-  const EmbeddedFile colours = stub_people_colours();
-  if (colours.size_bytes == 0) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "This build has no sprites for stub:people; ",
-                "use stub:pattern, or build with MAQ_STUB_PEOPLE_JPEG.");
-  }
-  BgraImage image = decode_people_sheet(colours, stub_people_mask());
+BgraImage read_sheet() {
+  BgraImage image = read_people_sheet();
   if (image.width_px != kTileWidthPx * kCycleFrames || image.height_px != kTileHeightPx * kPeople) {
     throw Error(MAQ_ERROR_INTERNAL, "The sprite sheet of stub:people is ", image.width_px, " x ", image.height_px,
                 ", but must be ", kTileWidthPx * kCycleFrames, " x ", kTileHeightPx * kPeople, ".");
@@ -62,7 +57,7 @@ StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px) : 
   Dice dice(seed);
   background_ = draw_room(width_px, height_px, dice);
   if (count == 0) return;
-  const BgraImage sheet = decode_sheet();
+  const BgraImage sheet = read_sheet();
   const int first_row = dice.below(kPeople);
   for (int i = 0; i < count; ++i) {
     Walker walker;

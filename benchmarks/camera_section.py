@@ -1,4 +1,4 @@
-"""The part of the report that tells of cameras."""
+"""Writes the section "Cameras" of the report."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ NAMES = {"vivid": "vivid, the kernel's test camera", "vivid_640x480": "vivid", "
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what cameras.measure returned."""
+    """Returns the title and the parts of the section, from a document of cameras.measure."""
     parts: list = [
         "How frames get from a camera to the app, which does nothing with them. The cameras of the first table are "
         "in a virtual machine with Debian's kernel, its V4L2 drivers and its USB. Its processor is emulated: one "

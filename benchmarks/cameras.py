@@ -1,4 +1,4 @@
-"""How frames get from a camera to the app: none lost, unplugging, age, processor time, heap.
+"""Measures how frames get from a camera to the app: lost frames, unplugging, age, processor time, heap allocations.
 
     python -m benchmarks --only cameras              about 3 minutes; `make build` first
     python -m benchmarks --only cameras --no-guest   without the virtual machine
@@ -34,14 +34,14 @@ STUB = "stub:pattern?live=1&size=640x480&fps=30"
 COUNTED = "stub:pattern?live=1&size=320x240&fps=400"
 COUNT_FROM, COUNT_TO = 200, 1200
 UNPLUG_AT_S = 2.0
-ABSENCES_S = (1.0, 1.03, 1.06)  # end at other times between two checks of the source, 100 ms apart
-UNUSABLE = 77  # exit status of run.sh where there can be no virtual machine
+ABSENCES_S = (1.0, 1.03, 1.06)  # two checks of the source are 100 ms apart, so the times vary
+UNUSABLE = 77  # exit status of run.sh if no virtual machine can run
 
 
 @dataclass(frozen=True)
 class Outage:
-    """Milliseconds from unplugging to the app's notification, from plugging in to the first frame, and from the
-    device's return to the first frame."""
+    """Times in milliseconds: from unplugging to the app's notification, from plugging in to the first frame, and from
+    the return of the device to the first frame."""
 
     noticed_ms: float
     replug_ms: float
@@ -49,7 +49,7 @@ class Outage:
 
 
 def play(uri: str, *arguments: str, **environment: str) -> dict:
-    """The metrics of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
+    """Returns the metrics of one run of `maquette play`. Raises FileNotFoundError, CalledProcessError."""
     if not frame_time.PROGRAM.exists():
         raise FileNotFoundError(f"{frame_time.PROGRAM} is not there: make build")
     with tempfile.TemporaryDirectory() as folder:
@@ -60,13 +60,13 @@ def play(uri: str, *arguments: str, **environment: str) -> dict:
 
 
 def cpu_utilization(longer: dict, shorter: dict) -> float:
-    """Of a core, without what starting and ending take: from two runs of the same that differ in length."""
+    """Returns the used fraction of a core without start and end, from two runs that differ in length alone."""
     spent_s = [run["cpu_utilization"] * run["wall_seconds"] for run in (longer, shorter)]
     return (spent_s[0] - spent_s[1]) / (longer["wall_seconds"] - shorter["wall_seconds"])
 
 
 def outages(played: dict, cycles: list[dict]) -> list[Outage]:
-    """Of each time that the camera was unplugged. cycles: when that was and when it came again, on the monotonic clock.
+    """Returns the times of each outage. cycles: times of unplugging and return, on the monotonic clock.
 
     Raises ValueError when the source did not notice, or did not come back, as often.
     """
@@ -87,8 +87,8 @@ def outages(played: dict, cycles: list[dict]) -> list[Outage]:
 
 
 def fault_outage(absence_s: float) -> Outage:
-    """Of a stub that is away for so long. Its time starts when it is opened, a little later than that of its metrics:
-    both are too long by that."""
+    """Returns the outages of a stub that is away for a given time. The stub's clock starts when the source opens, a
+    little after that of the metrics: two of the times are too long by that difference."""
     uri = f"{STUB}&unplug={absence_s:g}s@{UNPLUG_AT_S:g}s"
     played = play(uri, "--seconds", str(UNPLUG_AT_S + absence_s + 1))
     begin_s = played["start_monotonic_s"]
@@ -97,7 +97,8 @@ def fault_outage(absence_s: float) -> Outage:
 
 
 def count_allocations(folder: Path) -> dict:
-    """Frames and allocations of a live source in steady state. Raises CalledProcessError without a C compiler."""
+    """Returns frames and allocations of a live source in steady state. Raises CalledProcessError without a C
+    compiler."""
     library, count = folder / "count_allocations.so", folder / "count.json"
     subprocess.run(["cc", "-std=c11", "-O2", "-shared", "-fPIC", "-Isdk/include", "-o", str(library), str(COUNTER)],
                    check=True)  # fmt: skip
@@ -107,7 +108,7 @@ def count_allocations(folder: Path) -> dict:
 
 
 def measure_host(quick: bool) -> dict:
-    """Runs of each kind, alternately: lists by name."""
+    """Runs each kind alternately; returns a list of results for each kind."""
     rounds = 1 if quick else 3
     few, many = ("15", "60") if quick else ("30", "270")
     measured: dict[str, list] = {"stub": [], "recording": [], "closing": [], "outages": []}
@@ -142,7 +143,7 @@ def host_figures(measured: dict) -> dict[str, float]:
 
 
 def measure_guest(frames: int) -> tuple[dict, str]:
-    """What the guest said, by name, and why something is missing ("" when nothing is)."""
+    """Returns the metrics of the guest by name, and why some are missing ("" if none are)."""
     print("Cameras in a virtual machine: about a minute")
     run = subprocess.run(["tests/camera_vm/run.sh", "metrics"], env=os.environ | {"FRAMES": str(frames)},
                          stdout=subprocess.PIPE, text=True, check=False)  # fmt: skip
@@ -150,7 +151,8 @@ def measure_guest(frames: int) -> tuple[dict, str]:
 
 
 def read_guest(output: str, status: int) -> tuple[dict, str]:
-    """The lines `figure NAME JSON` of run.sh by name, with `outages` made of `plug`, and why something is missing.
+    """Parses the lines `figure NAME JSON` of run.sh, with `outages` computed from `plug`. Also returns why some are
+    missing.
 
     Raises ValueError for broken JSON.
     """
@@ -175,7 +177,7 @@ def read_guest(output: str, status: int) -> tuple[dict, str]:
 
 
 def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], dict[str, str]]:
-    """The metrics, and why others are missing."""
+    """Returns the metrics, and why others are missing."""
     metrics = {}
     for camera in ("vivid", "uvc"):
         played = said.get(camera)
@@ -192,7 +194,7 @@ def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], 
 
 
 def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the metrics that are targets, and why others are missing."""
+    """Returns the document, the metrics with a target, and why others are missing."""
     frames = 100 if quick else 1000
     host = measure_host(quick)
     said, why = measure_guest(frames) if with_guest else ({}, "left out by --no-guest")

@@ -1,8 +1,7 @@
-"""How much nearer the truth a bridged gap is than the last frame repeated: PSNR of the frames that a concealer makes
-up, by the length of the gap. A part of `python -m benchmarks.prediction`.
+"""Measures concealed gaps: PSNR of predicted frames beside the last frame repeated, by the length of the gap.
 
-A gap begins after every third frame of a clip, and its frames are predicted from those before it alone, as a concealer
-has them; it is at most 300 ms long.
+A gap begins after every third frame of a clip and is at most 300 ms long. Its frames are predicted from the frames
+before it alone, as a concealer does. Part of `python -m benchmarks.prediction`.
 """
 
 from __future__ import annotations
@@ -12,8 +11,8 @@ from typing import Protocol
 import maquette
 import numpy as np
 
-MAX_GAP_S = 0.3  # max_gap_ms of a concealer, by default
-FIRST_START, START_STEP = 4, 3  # predictions begin after these frames; native/measure_prediction.cpp has them as well
+MAX_GAP_S = 0.3  # default max_gap_ms of a concealer
+FIRST_START, START_STEP = 4, 3  # predictions begin after these frames, as in native/measure_prediction.cpp
 METRICS = ("concealment_gain_db", "concealment_worst_db")
 
 
@@ -24,7 +23,7 @@ class Film(Protocol):
 
 
 def longest_gap(fps: float) -> int:
-    """In frames."""
+    """Returns the length of the longest gap in frames."""
     return int(MAX_GAP_S * fps + 0.5)
 
 
@@ -34,11 +33,11 @@ def psnr_db(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def bridged(film: Film, threads: int = 1) -> np.ndarray:
-    """PSNR in dB of the last frame and of what AUTO predicts, by how many frames after it: [starts, frames, 2]."""
+    """Returns the PSNR in dB of the last frame and of the prediction by AUTO, by frames ahead: [starts, frames, 2]."""
     predictor = maquette.Predictor(threads=threads)
     longest, found = longest_gap(film.fps), []
     for t in range(len(film.bgr) - longest):
-        # Its format and channels do not matter to PSNR.
+        # The channel order does not change the PSNR.
         predictor.push(maquette.Frame(np.ascontiguousarray(film.bgr[t]), timestamp_ns=round(t * 1e9 / film.fps)))
         if t < FIRST_START or (t - FIRST_START) % START_STEP:
             continue
@@ -51,20 +50,20 @@ def bridged(film: Film, threads: int = 1) -> np.ndarray:
 
 
 def by_gap(found: np.ndarray) -> np.ndarray:
-    """Of `bridged`: the mean PSNR over all frames of gaps of 1, 2, ... frames [frames, 2]."""
+    """Returns the mean PSNR over all frames of gaps of 1, 2, ... frames, from a result of `bridged`: [frames, 2]."""
     by_frame = found.mean(0)
     return np.cumsum(by_frame, 0) / np.arange(1, len(by_frame) + 1)[:, None]
 
 
 def metrics_of(films: dict[str, np.ndarray]) -> dict[str, float]:
-    """What bridging gains over the last frame, mean over clips and lengths of gaps; and of the clip where that is
-    least."""
+    """Returns the gain in dB over the last frame: the mean over clips and lengths of gaps, and the smallest of a
+    clip."""
     gains = [float(np.mean(rows[:, 1] - rows[:, 0])) for rows in films.values()]
     return {"concealment_gain_db": float(np.mean(gains)), "concealment_worst_db": min(gains)}
 
 
 def measure(films: list[Film], threads: int = 1) -> dict[str, np.ndarray]:
-    """`by_gap` of each clip that is long enough for a gap, by its name."""
+    """Returns `by_gap` by name for each clip that is long enough for a gap."""
     return {
         film.name: by_gap(bridged(film, threads))
         for film in films if len(film.bgr) > FIRST_START + longest_gap(film.fps)
@@ -72,7 +71,7 @@ def measure(films: list[Film], threads: int = 1) -> dict[str, np.ndarray]:
 
 
 def table_of(films: dict[str, np.ndarray]) -> list[list[str]]:
-    """A head and a row a clip: the last frame repeated, what is predicted, by frames of the gap."""
+    """Returns a header and a row for each clip: PSNR of the last frame and of the prediction, by length of the gap."""
     longest = max(len(rows) for rows in films.values())
     table = [["clip, PSNR in dB", *(f"gap of {n}" for n in range(1, longest + 1))]]
     for name, rows in films.items():

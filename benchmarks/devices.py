@@ -1,4 +1,4 @@
-"""Devices beside each other: a table of reports of `maquette bench --json` and of the sample app's Benchmark screen.
+"""Compares devices: a table from reports of `maquette bench --json` and of the sample app's Benchmark screen.
 
 python -m benchmarks.devices phone.json laptop.json        # Markdown, one line for each device and source
 """
@@ -18,7 +18,7 @@ HEADER = (
 
 
 def read_report(path: Path) -> dict:
-    """The report of a file. Raises ValueError with a sentence for what is none."""
+    """Reads a report. Raises ValueError with a sentence if the file is not a report."""
     try:
         report = json.loads(path.read_text())
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
@@ -32,12 +32,12 @@ def read_report(path: Path) -> dict:
 
 
 def cell(text: object) -> str:
-    """Reports come from anywhere: a text must not end its cell, or be markup."""
+    """Escapes a text of a report, so that it cannot end its cell or be markup."""
     return str(text).replace("\\", "").replace("|", "/").replace("<", "(").replace("\n", " ")[:80]
 
 
 def lines_of(report: dict) -> list[str]:
-    """Markdown of the report's cases. Raises KeyError or TypeError where it lacks one of them."""
+    """Returns Markdown lines of the report's cases. Raises KeyError or TypeError if it lacks a field."""
     machine = report["machine"]
     memory = f"{float(report['peak_memory_mib']):.0f} MiB"
     return [
@@ -50,7 +50,7 @@ def lines_of(report: dict) -> list[str]:
 
 
 def table(paths: list[Path]) -> str:
-    """Raises ValueError for the first file that is no report."""
+    """Returns the table. Raises ValueError for the first file that is not a report."""
     lines = [HEADER]
     for path in paths:
         report = read_report(path)

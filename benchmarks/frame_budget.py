@@ -1,10 +1,10 @@
-"""A device that throttles: deadlines met and labels kept, with a frame budget and without.
+"""Measures a device that throttles: deadlines met and labels kept, with a frame budget and without.
 
-    python -m benchmarks --only frame_budget    some minutes; `make bench` builds what is needed
+    python -m benchmarks --only frame_budget    some minutes; `make bench` builds the program
 
-The same stream goes through a pipeline (benchmarks/native/measure_frame_budget.cpp) on one thread, at all and at
-fractions of the processor's time: Linux gives the process that fraction of each few milliseconds (control groups),
-which needs the right to make a group.
+The same stream goes through a pipeline (benchmarks/native/measure_frame_budget.cpp) on one thread, at the full
+processor time and at fractions of it. Linux control groups limit the process to that fraction, which needs the right to
+create a group.
 """
 
 from __future__ import annotations
@@ -25,16 +25,17 @@ from tqdm import tqdm
 from benchmarks.frame_time import OthersFraction
 from benchmarks.ui_latency import DENSE_POSE, PROGRAMS
 
-FRACTIONS = (1.0, 0.5, 0.25)  # of the processor's time
-ROOM = 1.3  # the budget, by the median time of a frame at all of it
+FRACTIONS = (1.0, 0.5, 0.25)  # fractions of the processor time
+ROOM = 1.3  # ratio of the budget to the median time of a frame at full processor time
 WIDTH, HEIGHT = 480, 360
-PERIOD_US, MIN_QUOTA_US = 4000, 1000  # short, so that a frame is slow and not interrupted once; the kernel's minimum
+PERIOD_US, MIN_QUOTA_US = 4000, 1000  # short, so that each frame is slowed down evenly; the minimum of the kernel
 GROUPS = Path("/sys/fs/cgroup")
 
 
 @dataclass(frozen=True)
 class Run:
-    """ms, side_px, is_key: of each frame. labels: uint8 [frames, height, width], body parts, 0 for background."""
+    """ms, side_px, is_key: one entry for each frame. labels: uint8 [frames, height, width], body parts, 0 for
+    background."""
 
     ms: np.ndarray
     side_px: np.ndarray
@@ -44,8 +45,8 @@ class Run:
 
 @contextmanager
 def processor_fraction(fraction: float) -> Iterator[list[str]]:
-    """What begins a command so that it gets at most that fraction of one core's time. Raises OSError where no control
-    group can be made."""
+    """Returns the words before a command that limit it to that fraction of a core. Raises OSError if no control group
+    can be created."""
     if fraction >= 1:
         yield []
         return
@@ -65,7 +66,8 @@ def processor_fraction(fraction: float) -> Iterator[list[str]]:
 
 
 def run_stream(frames: int, fraction: float, budget_ms: float) -> Run:
-    """Raises FileNotFoundError without the program, CalledProcessError, OSError where nothing can be throttled."""
+    """Runs the program. Raises FileNotFoundError without it, CalledProcessError, OSError if the process cannot be
+    throttled."""
     program = PROGRAMS / "measure_frame_budget"
     if not program.exists():
         raise FileNotFoundError(f"{program} is not there: make bench builds it")
@@ -79,16 +81,17 @@ def run_stream(frames: int, fraction: float, budget_ms: float) -> Run:
 
 
 def agreement(labels: np.ndarray, wanted: np.ndarray) -> float:
-    """Of the pixels that either has on a body, the fraction of the same part."""
+    """Returns the fraction of pixels with the same part, among pixels that are a person in either."""
     body = (labels > 0) | (wanted > 0)
     return float((labels == wanted)[body].mean())
 
 
 def row(run: Run, wanted: np.ndarray, budget_ms: float, fraction: float, has_budget: bool) -> dict:
-    """What the table has of a run. met_late: of the second half of its frames, when the budget has been found."""
+    """Returns the row of a run for the table. met_late: deadlines met in the second half, after the budget was
+    found."""
     met = run.ms <= budget_ms
     changes = np.flatnonzero(np.diff(run.side_px)) + 1
-    # Of the first frame with an input of another size, by the median of the ten after it.
+    # Compares the first frame after a change of the input size with the median of the ten frames after it.
     costs = [run.ms[k] / np.median(run.ms[k + 1 : k + 11]) for k in changes if k + 11 < len(met)]
     return {
         "fraction": fraction,
@@ -105,7 +108,7 @@ def row(run: Run, wanted: np.ndarray, budget_ms: float, fraction: float, has_bud
 
 
 def throttle_missing() -> str:
-    """Why the processor cannot be throttled, "" when it can."""
+    """Returns why the processor cannot be throttled, "" if it can."""
     try:
         with processor_fraction(FRACTIONS[-1]):
             return ""
@@ -130,7 +133,7 @@ def measure(quick: bool) -> dict:
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """For the report."""
+    """Returns the title and the parts of the section."""
     title = "A frame budget while a device throttles"
     if "missing" in measured:
         return title, [f"Not measured: {measured['missing']}."]

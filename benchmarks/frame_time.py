@@ -1,4 +1,4 @@
-"""Time of frames of dense pose by `maquette bench`: people, pixels and threads; start and memory of a process."""
+"""Measures frames of dense pose by `maquette bench`: people, pixels and threads; start and memory of a process."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ PROGRAM = Path("build/release/stage/bin/maquette")
 PEOPLE = (0, 1, 2, 3, 4, 6, 8)
 SIZES = ((320, 240), (640, 480), (1280, 720), (1920, 1080))
 STARTS = 9
-MAX_OTHERS = 0.05  # of all cores: more, and times are doubtful
+MAX_OTHERS = 0.05  # fraction of all cores; beyond it, times are not reliable
 
 
 def bench(sources: list[str], *arguments: str) -> dict:
-    """One run of `maquette bench`. Raises FileNotFoundError without the program, CalledProcessError when it fails."""
+    """Runs `maquette bench` once. Raises FileNotFoundError without the program, CalledProcessError if it fails."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is not there: make build")
     with tempfile.TemporaryDirectory() as folder:
@@ -33,7 +33,7 @@ def bench(sources: list[str], *arguments: str) -> dict:
 
 
 def machine() -> dict:
-    """This machine, as `maquette bench` describes it."""
+    """Returns this machine, as `maquette bench` describes it."""
     return bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0")["machine"]
 
 
@@ -42,7 +42,7 @@ def people(count: int, size: tuple[int, int] = (640, 480)) -> str:
 
 
 class OthersFraction:
-    """The fraction of all cores that other processes take, from now on."""
+    """Measures the fraction of all cores that other processes use from now on."""
 
     def __init__(self) -> None:
         self.begin = self.spent_s()
@@ -60,7 +60,7 @@ class OthersFraction:
 
 
 def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, float], dict]:
-    """The scaling curves, the metrics that are targets, and the machine."""
+    """Returns the scaling curves, the metrics with a target, and the machine."""
     runs = ["--runs", "20", "--seconds", "0"] if quick else ["--runs", "150", "--seconds", "3"]
     main = bench([people(k) for k in PEOPLE], *runs, "--threads", str(threads))
     sizes = bench([people(1, size) for size in SIZES], *runs, "--threads", str(threads))

@@ -1,4 +1,5 @@
-"""The graphs of a bundle with what they see on a photograph, and what they cost: for peers and roofline."""
+"""Prepares the graphs of a bundle with their inputs for a photo, and counts their operations, for runtimes and
+roofline."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ Feed = dict[str, np.ndarray]
 
 
 def four_by_three(path: Path = PHOTO) -> np.ndarray:
-    """The middle of a photograph in the shape of a camera's frame, uint8 [480, 640, 3] RGB."""
+    """Returns the middle of a photo in the shape of a camera frame, uint8 [480, 640, 3] RGB."""
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError(f"{path} cannot be read as a photograph.")
@@ -31,11 +32,12 @@ def four_by_three(path: Path = PHOTO) -> np.ndarray:
 
 
 def feeds_of(bundle: Bundle, image: np.ndarray) -> dict[str, Feed]:
-    """What each graph is given for `image` (uint8 [H, W, 3] RGB) with the best person alone in the dense head."""
+    """Returns the inputs of each graph for `image` (uint8 [H, W, 3] RGB), with the best person alone in the dense
+    head."""
     network = bundle.network
     found = detect(bundle.graphs, image, network, bundle.decode)
     if not len(found.boxes):
-        raise ValueError("the bundle finds no person in the picture that the graphs are measured with")
+        raise ValueError("the bundle finds no person in the image that the graphs are measured with")
     given = {
         "trunk": [found.tensor],
         "rpn_fine": found.features[:1],
@@ -53,8 +55,8 @@ def feeds_of(bundle: Bundle, image: np.ndarray) -> dict[str, Feed]:
 
 @dataclass(frozen=True)
 class Work:
-    """One node's work. macs: multiply-adds; bytes: of its inputs, weights and outputs, each moved once. integer:
-    whether it computes on 8-bit numbers."""
+    """The work of one node. macs: multiply-adds; bytes: inputs, weights and outputs, each moved once. integer: whether
+    it computes on 8-bit numbers."""
 
     node: str
     macs: int
@@ -63,7 +65,7 @@ class Work:
 
 
 def work_of(path: Path, feed: Feed) -> list[Work]:
-    """The convolutions and matrix products of a graph at the sizes of `feed`."""
+    """Returns the convolutions and matrix products of a graph at the sizes of `feed`."""
     model = onnx.load(path)
     for value in model.graph.input:
         for dimension, size in zip(value.type.tensor_type.shape.dim, feed[value.name].shape, strict=True):
@@ -90,7 +92,7 @@ def work_of(path: Path, feed: Feed) -> list[Work]:
 
 
 def multiply_adds(node: onnx.NodeProto, source: list[int], weight: list[int], out: list[int]) -> int:
-    """Of one node, from the shapes of its first input, weight and output."""
+    """Returns the multiply-adds of one node, from the shapes of its first input, weight and output."""
     if node.op_type == "Conv":
         return int(np.prod(out)) * int(np.prod(weight[1:]))
     if node.op_type == "ConvTranspose":

@@ -1,7 +1,7 @@
-"""People at any size: what larger input, crops of people and key frames cost and gain.
+"""Compares input sizes, crops of people and key frames for people of any size: cost and gain.
 
-On rendered people of 640 x 512 that no training saw, some small, tilted, in crowds; on photographs, by labels of other
-networks; and on moments that four calibrated cameras saw (`export.evaluation.views`). All settings take turns.
+Data: rendered people of 640 x 512 that no training saw, some small, tilted or in crowds; photographs, with labels by
+other networks; and moments that four calibrated cameras saw (`export.evaluation.views`). All settings alternate.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CROPS = {
     ", crops of all, 256 px": {"person_crops": 2, "person_crop_px": 256},
 }
 KEY_FRAMES = 4
-# Metrics of each data set, of which the larger is the better, and what the report calls them.
+# Metrics of each data set for which larger is better, and their names in the report.
 METRICS = {
     "rendered": {"part": "part", "mask": "mask IoU", "side": "left/right", "gps": "AP by GPS"},
     "photographs": {"recall": "recall at P .9", "mask": "mask IoU", "part": "part", "side": "left/right"},
@@ -49,7 +49,7 @@ class Pictures:
 
 
 def settings() -> list[Setting]:
-    """What is measured."""
+    """Returns the measured settings."""
     made = []
     for side in SIDES:
         for said, options in CROPS.items():
@@ -61,7 +61,8 @@ def settings() -> list[Setting]:
 
 
 def measure(pictures: Pictures, bundle: Path, table: object, threshold: float, threads: int = 2) -> list[dict]:
-    """For each setting its name, axis, milliseconds a frame (median over all pictures) and metrics by data set."""
+    """Returns for each setting its name, axis, milliseconds a frame (median over all images) and metrics by data
+    set."""
     wanted = settings()
     columns = [Column(setting, bundle, threads) for setting in wanted]
     photographs = [photos.read_photo(path) for path in pictures.photographs.photos]
@@ -117,7 +118,7 @@ def view_figures(backend: Replay, pictures: Pictures, images: list[np.ndarray]) 
 
 
 def draw(document: dict) -> plt.Figure:
-    """Part accuracy of each data set against run time."""
+    """Plots part accuracy of each data set against run time."""
     rows = document["person_sizes"]
     known = [name for name in METRICS if rows[0][name]]
     figure, axes = plt.subplots(1, len(known), figsize=(6 * len(known), 5), squeeze=False)
@@ -142,7 +143,7 @@ def draw(document: dict) -> plt.Figure:
 
 
 def section(rows: list[dict]) -> tuple[str, list]:
-    """For the report."""
+    """Returns the title and the parts of the section."""
     known = [name for name in METRICS if rows[0][name]]
     columns = [(name, key) for name in known for key in METRICS[name]]
     table = [["setting", "ms", *(f"{name}: {METRICS[name][key]}" for name, key in columns)]]
@@ -151,11 +152,11 @@ def section(rows: list[dict]) -> tuple[str, list]:
         table.append([row["setting"], f"{row['ms']:.1f}", *("-" if x is None else f"{x:.3f}" for x in metrics)])
     missing = ", ".join(name for name in METRICS if name not in known)
     return "People at any size", [
-        ("people-at-any-size.png", "Input size, crops of people and key frames, on pictures that no training saw."),
+        ("people-at-any-size.png", "Input size, crops of people and key frames, on images that no training saw."),
         "Rendered people of 640 x 512, a third of them from behind, many tilted, small or in crowds; photographs, "
         "judged by what other networks say of them; a person seen by four calibrated cameras at five moments (gain: "
         "how much nearer points of equal part, U and V lie to each other's epipolar lines than points of the same part "
-        "paired at random). The time is the median over all these pictures.",
+        "paired at random). The time is the median over all these images.",
         *([f"Not measured: {missing}, for want of labels (python -m export.teachers)."] if missing else []),
         table,
     ]

@@ -1,14 +1,13 @@
-"""What is predicted of clips: PSNR and SSIM by time ahead beside the last frame and OpenCV's DIS, how exact the motion
-behind it is, run times, how long a concealer's frames are waited for and how near the truth they are; how long surprise
-takes.
+"""Measures predicted frames of clips: PSNR and SSIM by frames ahead beside the last frame and OpenCV's DIS, the error
+of the estimated motion, run times, waits and PSNR of a concealer, and the time of novelty scores.
 
     python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (14 minutes)
-    python -m benchmarks.prediction --quick                 fewer clips, to see that it runs
-    python -m benchmarks --only prediction                  the same as a part of the report
+    python -m benchmarks.prediction --quick                 fewer clips, a smoke test
+    python -m benchmarks --only prediction                  the same as a section of the report
 
-Needs clips of `export.clips` (.data/clips/pushing/val), those of `export.photos` (.data/photos/clip), and the programs
-measure_prediction and find_motion (`cmake --build --preset release --target measure_prediction find_motion`). What is
-not there is left out, and said. Predictions begin at every third frame; all methods see the same frames.
+Needs clips of `export.clips` (.data/clips/pushing/val) and of `export.photos` (.data/photos/clip), and the programs
+measure_prediction and find_motion (`cmake --build --preset release --target measure_prediction find_motion`). The
+report names clips that are missing. Predictions begin at every third frame; all methods see the same frames.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ PROGRAM = Path("build/release/benchmarks/native/measure_prediction")
 HORIZONS = (1, 3, 5, 8)  # frames ahead
 BUNDLE = Path("sdk/models/prediction-int8")
 SIZE_PX, LARGE_PX = (320, 240), (640, 480)
-FRAMES = 90  # of a real clip
+FRAMES = 90  # frames of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
 METRICS = (
     "prediction_pictures_a_second", "concealed_wait_p99_ms", "novelty_frames_a_second", *concealment.METRICS,
@@ -51,7 +50,7 @@ METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto"
 
 @dataclass(frozen=True)
 class Film:
-    """name, and bgr: uint8 [T, H, W, 3] at `fps` frames a second."""
+    """A clip: name, and bgr: uint8 [T, H, W, 3] at `fps` frames a second."""
 
     name: str
     bgr: np.ndarray
@@ -64,7 +63,7 @@ def measure(
     photos: Path = Path(".data/photos/clip"),
     threads: int = 2,
 ) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """The document, the metrics of METRICS, and why one is missing.
+    """Returns the document, the metrics of METRICS, and why others are missing.
 
     Raises FileNotFoundError where the program was not built, subprocess.SubprocessError where it fails.
     """
@@ -113,8 +112,8 @@ def measure(
 
 
 def measure_sampling(quick: bool, folder: Path, threads: int) -> tuple[dict, dict[str, float]]:
-    """Of the validation clips of a folder DATA/SET/val: the document, and its metrics."""
-    from benchmarks.sampling import measure  # torch: not before it is needed
+    """Returns the document and its metrics for the validation clips of a folder DATA/SET/val."""
+    from benchmarks.sampling import measure  # torch is imported late, since it loads slowly
 
     data, kind = folder.parent.parent, folder.parent.name
     clips = measure.clips_of(data, kind, 2 if quick else None)
@@ -144,7 +143,7 @@ def real_films(folder: Path, size_px: tuple[int, int], quick: bool) -> list[Film
 
 
 def read_film(path: Path, step: int, size_px: tuple[int, int], most: int = FRAMES) -> list[np.ndarray]:
-    """Every `step`-th frame of a file, BGR uint8, at most so many."""
+    """Reads every `step`-th frame of a file, BGR uint8, at most `most`."""
     capture, frames, index = cv2.VideoCapture(str(path)), [], 0
     while len(frames) < most:
         there, frame = capture.read()
@@ -157,7 +156,7 @@ def read_film(path: Path, step: int, size_px: tuple[int, int], most: int = FRAME
 
 
 def clip_films(folder: Path, most: int) -> list[Film]:
-    """Of a folder DATA/SET/SPLIT, at most so many clips that have frames of 320 x 240."""
+    """Reads at most `most` clips of a folder DATA/SET/SPLIT that have frames of 320 x 240."""
     films = []
     for path in sorted(folder.glob("clip-*.npz"))[:most]:
         clip = read_clip(path)
@@ -184,8 +183,8 @@ def measure_film(film: Film, threads: int, has_ssim: bool = False) -> dict:
 
 
 def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
-    """Constant velocity by OpenCV's DIS (preset medium), fetched backward: PSNR by horizon, and milliseconds of motion
-    and one picture, on OpenCV's own threads."""
+    """Extrapolates by OpenCV's DIS (preset medium) at constant velocity, warped backward. Returns PSNR by horizon, and
+    milliseconds for the motion and one image on OpenCV's own threads."""
     dis = Dis(*frames.shape[1:3])
     errors: dict[int, list[float]] = {horizon: [] for horizon in HORIZONS}
     times = []
@@ -201,7 +200,8 @@ def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
 
 
 def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
-    """Surprise of a simulated camera of 640 x 480: by median wall-clock time, processor time, medians of stages."""
+    """Measures novelty scores of a simulated camera of 640 x 480: median wall-clock time, processor time, and
+    stages."""
     surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
     stats, used_ms = [], []
     for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
@@ -214,7 +214,7 @@ def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, 
 
 
 def means_of(rows: list[dict]) -> dict[str, dict]:
-    """Of pushing and of the real clips: PSNR and SSIM by method and horizon, means over clips."""
+    """Returns PSNR and SSIM by method and horizon, means over the clips of pushing and over the real clips."""
     sets = {"pushing": [row for row in rows if row["film"].startswith("pushing")],
             "real": [row for row in rows if not row["film"].startswith("pushing")]}  # fmt: skip
     return {
@@ -231,12 +231,12 @@ def mean_by_horizon(rows: list[dict], key: str) -> list[float]:
 
 
 def methods_in(sets: dict[str, dict]) -> list[str]:
-    """A report measured before has fewer."""
+    """Returns the methods that all sets have; an older document has fewer."""
     return [method for method in METHODS if all(method in means for means in sets.values())]
 
 
 def ssim_table(sets: dict[str, dict]) -> list[list[str]]:
-    """A head and a row a set: SSIM by method and frames ahead; nothing of sets that were measured without."""
+    """Returns a header and a row for each set: SSIM by method and frames ahead. Sets without SSIM are left out."""
     methods = methods_in(sets)
     table = [["clips, SSIM", *(f"{METHODS[name]} +{horizon}" for horizon in HORIZONS for name in methods)]]
     for name, means in sets.items():
@@ -247,8 +247,8 @@ def ssim_table(sets: dict[str, dict]) -> list[list[str]]:
 
 
 def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
-    """A head and rows: of each clip and set, PSNR in dB by method and frames ahead, and how much of auto's pictures is
-    motion's."""
+    """Returns a header and a row for each clip and set: PSNR in dB by method and frames ahead, and the weight of motion
+    in AUTO."""
     methods = methods_in(sets)
     table = [["clip", *(f"{METHODS[name]} +{ahead}" for ahead in HORIZONS for name in methods), "motion in auto"]]
     for row in rows:
@@ -262,7 +262,7 @@ def table_of(rows: list[dict], sets: dict[str, dict]) -> list[list[str]]:
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what measure returned."""
+    """Returns the title and the parts of the section, from a document of `measure`."""
     waits = measured["waits"]
     parts: list = [
         "What a predictor makes of a stream 1, 3, 5 and 8 frames after it saw its latest: PSNR in dB (320 x 240). "
@@ -272,7 +272,7 @@ def section(measured: dict) -> tuple[str, list]:
     ]
     structure = ssim_table(measured["sets"])
     parts += [structure] if len(structure) > 1 else []
-    errors = measured.get("motion_error_px", {})  # a report measured before has none
+    errors = measured.get("motion_error_px", {})  # an older document has none
     if "motion" in errors:
         parts.append(
             f"Motion from frame to frame of {errors['clips']} of pushing, where things move (by "
@@ -288,8 +288,8 @@ def section(measured: dict) -> tuple[str, list]:
             "threads",
             "frame pushed",
             "with auto",
-            "picture made",
-            "pictures a second",
+            "image made",
+            "images a second",
             "CPU time",
             "DIS, its threads",
         ]
@@ -306,7 +306,7 @@ def section(measured: dict) -> tuple[str, list]:
         f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
         f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
     )
-    if measured.get("concealment"):  # a report measured before has none
+    if measured.get("concealment"):  # an older document has none
         parts.append(
             "Gaps of up to 300 ms bridged, PSNR in dB over their frames: the last frame repeated / what is predicted."
         )

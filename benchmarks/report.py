@@ -1,4 +1,4 @@
-"""The benchmark as pictures, a Markdown page and an HTML page, for readers who never saw the project."""
+"""Writes the report: images, a Markdown page and an HTML page, for readers who are new to the project."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COLOURS = {"shipped": "black", "precision": "tab:red", "input size": "tab:blue",
 
 
 def write(document: dict, folder: Path) -> list[Path]:
-    """Writes pictures, report.md and index.html of the parts that were measured into `folder`; returns their paths."""
+    """Writes images, report.md and index.html of the measured sections into `folder`; returns their paths."""
     written = []
     for name, (draw, part) in PICTURES.items():
         if part in document:
@@ -44,7 +44,7 @@ def write(document: dict, folder: Path) -> list[Path]:
 
 
 def error_against_time(document: dict) -> plt.Figure:
-    # Parts alone have no U and V to be right.
+    # Settings without U and V have no surface error.
     rows = [row for row in document["sweep"] if row["axis"] != "detail"]
     figure, axes = plt.subplots(1, 2, figsize=(15, 6))
     for axis, key, label in ((axes[0], "error", "1 - AP by GPS"), (axes[1], "error_cm", "median surface error, cm")):
@@ -120,7 +120,7 @@ def runtimes(document: dict) -> plt.Figure:
     return figure
 
 
-# Pictures, what draws each, and the part of the document that it cannot do without.
+# Images, the function that draws each, and the section of the document that it needs.
 PICTURES = {
     "error-against-run-time.png": (error_against_time, "sweep"),
     "people-at-any-size.png": (person_sizes.draw, "person_sizes"),
@@ -129,12 +129,12 @@ PICTURES = {
     "runtimes.png": (runtimes, "runtimes"),
 }
 
-Section = tuple[str, list]  # title, and what follows: a text, a picture's (name, caption), or a table as lists of cells
+Section = tuple[str, list]  # the title, then texts, images as (name, caption), and tables as lists of rows
 
 
 def text_sections(document: dict) -> list[Section]:
     intro = (
-        "Maquette finds people in a camera's pictures and maps each of their pixels to a body surface, on two "
+        "Maquette finds people in a camera's images and maps each of their pixels to a body surface, on two "
         "processor cores. This page says what that costs here, and what each setting trades."
     )
     sections = [
@@ -156,8 +156,8 @@ def sweep_section(sweep: list[dict]) -> Section:
         rows.append([row["setting"], *metrics, "●" if k in front else ""])
     return "Error against run time", [
         ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
-        "Rendered people that no training saw; all settings measured alternately on the same pictures. AP by GPS: "
-        "average precision by geodesic point similarity (1 is perfect). With key frames the picture moves by 1 % of "
+        "Rendered people that no training saw; all settings measured alternately on the same images. AP by GPS: "
+        "average precision by geodesic point similarity (1 is perfect). With key frames the image moves by 1 % of "
         "its width a frame; the error is that of the last frame before the next key frame.",
         rows,
     ]
@@ -174,7 +174,7 @@ def frames_section(frames: dict) -> Section:
     return "Time of a frame", [
         ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
         ("stages.png", "Where the time goes."),
-        "From asking the source for a picture to having the result; walking people of the stub source. "
+        "From asking the source for an image to having the result; walking people of the stub source. "
         "CPU ms: CPU time of all threads for a frame, a measure of its energy on every machine.",
         rows,
     ]
@@ -196,7 +196,7 @@ def runtimes_section(measured: dict) -> Section:
         line_rows.append([name, f"{graph['macs'] / 1e6:.1f}", f"{graph['int8_macs'] / max(graph['macs'], 1):.0%}",
                           f"{graph['min_ms']:.2f}", f"{graph['fraction']:.0%}"])  # fmt: skip
     return "Other runtimes on the same graphs", [
-        ("runtimes.png", "The five networks for a picture with one person."),
+        ("runtimes.png", "The five networks for an image with one person."),
         rows,
         f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
         f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
@@ -210,7 +210,7 @@ def agreement_section(agreement: dict) -> Section:
     return "int8 against fp32", [
         f"Of the pixels that are a person's in fp32, {agreement['labels']:.1%} have the same part in int8; of those "
         f"that are a person's in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
-        f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} pictures show as many people."
+        f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} images show as many people."
     ]
 
 
@@ -231,7 +231,7 @@ SECTIONS = {
 
 
 def warnings_of(document: dict) -> set[str]:
-    """Why metrics of the measured parts are unreliable, as the parts say."""
+    """Returns why metrics of the measured sections are unreliable."""
     frames = document.get("frames", {})
     runs = [frames[name] for name in ("people", "sizes", "one_thread") if name in frames]
     found = {text for run in runs for text in run["warnings"]}
@@ -285,7 +285,7 @@ td:first-child, th:first-child { text-align: left; } figcaption { color: #555; f
 
 
 def page(sections: list[Section], folder: Path) -> str:
-    """One HTML file with its pictures inside."""
+    """Returns one HTML file with its images inside."""
     body = []
     for level, (title, parts) in enumerate(sections):
         body.append(f"<h{min(level, 1) + 1}>{html.escape(title)}</h{min(level, 1) + 1}>")

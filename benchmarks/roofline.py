@@ -1,9 +1,9 @@
-"""The maximum that this machine can do, measured, and the fraction of it that the networks reach.
+"""Measures the peak rates of this machine, and the fraction of them that the networks reach.
 
-Each convolution and matrix product takes at least its multiply-adds over the peak rate of its numbers, and at least its
-bytes over the bandwidth; the larger of the two, summed over a graph, is the time that no runtime can beat on this
-machine (the roofline model of Williams, Waterman and Patterson, 2009, layer by layer). The share is that time by the
-measured one. Bandwidth is that of the caches, where the networks' maps lie, so the roofline is a high one.
+Each convolution and matrix product takes at least its multiply-adds over the peak rate of its number format, and at
+least its bytes over the bandwidth. The sum of the larger of the two over a graph is a lower bound of its time (the
+roofline model of Williams, Waterman and Patterson, 2009, layer by layer). The fraction is this bound divided by the
+measured time. The bandwidth is measured within the caches, where the networks' maps lie.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from onnx import TensorProto, helper
 
 from benchmarks.graphs import Work
 
-SIZES = (768, 1024, 1536)  # of the square products that the peak is looked for with
-COPIED_BYTES = 1 << 20  # fits the second-level caches, read and written
+SIZES = (768, 1024, 1536)  # sizes of the square products with which the peak is measured
+COPIED_BYTES = 1 << 20  # fits the second-level cache, read and written
 
 
 def best_seconds(work: Callable[[], object], repeats: int = 9) -> float:
-    """Median of several runs after two to warm up."""
+    """Returns the median of several runs after two warm-up runs."""
     work(), work()
     seconds = []
     for _ in range(repeats):
@@ -35,7 +35,7 @@ def best_seconds(work: Callable[[], object], repeats: int = 9) -> float:
 
 
 def product_session(size: int, integer: bool, threads: int) -> tuple[onnxruntime.InferenceSession, dict]:
-    """One matrix product of ONNX Runtime: float32, or uint8 by int8 with the weights known beforehand."""
+    """Builds one matrix product of ONNX Runtime: float32, or uint8 by int8 with constant weights."""
     kinds = (TensorProto.UINT8, TensorProto.INT32) if integer else (TensorProto.FLOAT, TensorProto.FLOAT)
     rng = np.random.default_rng(0)
     weight = rng.integers(-64, 64, (size, size)).astype(np.int8 if integer else np.float32)
@@ -56,7 +56,7 @@ def product_session(size: int, integer: bool, threads: int) -> tuple[onnxruntime
 
 
 def peak_rate(integer: bool, threads: int) -> float:
-    """Multiply-adds a second of the best product found, of those that ONNX Runtime and PyTorch can do."""
+    """Returns multiply-adds a second of the fastest product of ONNX Runtime and PyTorch."""
     import torch
 
     torch.set_num_threads(threads)
@@ -75,7 +75,7 @@ def peak_rate(integer: bool, threads: int) -> float:
 
 
 def bandwidth(threads: int) -> float:
-    """Bytes a second, read and written, of copying within the caches."""
+    """Returns bytes a second, read and written, of copies within the caches."""
     import torch
 
     torch.set_num_threads(threads)
@@ -90,7 +90,7 @@ def min_seconds(work: list[Work], float_rate: float, integer_rate: float, byte_r
 
 
 def measure(work: dict[str, list[Work]], ms: dict[str, float], threads: int = 2) -> dict[str, object]:
-    """work, ms: of each graph its operations and its measured time in milliseconds."""
+    """work, ms: operations of each graph and its measured time in milliseconds."""
     rates = {"float32_macs_s": peak_rate(False, threads), "int8_macs_s": peak_rate(True, threads)}
     rates["bytes_s"] = bandwidth(threads)
     graphs = {}

@@ -1,4 +1,4 @@
-"""The same graphs in other runtimes, measured alternately: how fast is ours beside them?
+"""Compares the time of the same graphs in several runtimes, measured alternately.
 
     python -m benchmarks.runtimes            writes build/benchmarks/runtimes.json
 
@@ -34,18 +34,18 @@ from export.densepose.graphs import open_bundle
 
 @dataclass(frozen=True)
 class Runner:
-    """run: one graph on its fixed inputs, which is what is timed. read: the outputs of the last run."""
+    """run: runs one graph on fixed inputs, which is timed. read: returns the outputs of the last run."""
 
     run: Callable[[], object]
     read: Callable[[], list[np.ndarray]]
 
 
-TOLERANCE = 0.02  # largest difference from ours that is called the same computation, relative to the largest value
+TOLERANCE = 0.02  # largest accepted difference from our results, relative to the largest value
 
 
 @dataclass
 class Runtime:
-    """A runtime with a precision. ms: milliseconds of each graph, medians. missing: why it was not measured."""
+    """A runtime with a precision. ms: median milliseconds of each graph. missing: why it was not measured."""
 
     name: str
     version: str
@@ -60,7 +60,7 @@ class Runtime:
 
 
 def maquette_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """ONNX Runtime, set up as sdk/src/nn/session.cpp sets it up."""
+    """Returns ONNX Runtime with the settings of sdk/src/nn/session.cpp."""
     runs = {}
     for name, feed in feeds.items():
         options = onnxruntime.SessionOptions()
@@ -81,7 +81,7 @@ def maquette_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[s
 
 
 def openvino_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """OpenVINO for latency, in float32 where the graph is float."""
+    """Returns OpenVINO with the latency hint, in float32 if the graph is float."""
     import openvino
 
     core, runs = openvino.Core(), {}
@@ -101,7 +101,7 @@ def openvino_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[s
 
 
 def litert_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """LiteRT, whose kernels are XNNPACK's. It gets the graphs as TensorFlow Lite files with signed activations."""
+    """Returns LiteRT with the kernels of XNNPACK; its graphs are TensorFlow Lite files with signed activations."""
     from importlib.metadata import version
 
     from ai_edge_litert.interpreter import Interpreter
@@ -125,7 +125,8 @@ def litert_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[str
 
 
 def torch_runs(checkpoint: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """The trained network in PyTorch, eager, channels last, batch normalisation folded as in the exported graphs."""
+    """Returns the trained network in PyTorch: eager, channels last, batch normalisation folded as in the exported
+    graphs."""
     import torch
 
     torch.set_num_threads(threads)
@@ -148,7 +149,7 @@ def torch_runs(checkpoint: Path, feeds: dict[str, Feed], threads: int) -> tuple[
 
 
 def torch_modules(checkpoint: Path, feeds: dict[str, Feed]) -> dict[str, tuple]:
-    """Each graph's module in evaluation mode and its inputs."""
+    """Returns the module of each graph in evaluation mode, and its inputs."""
     import torch
 
     from export.densepose.config import NetworkConfig
@@ -164,7 +165,8 @@ def torch_modules(checkpoint: Path, feeds: dict[str, Feed]) -> dict[str, tuple]:
 
 
 def ncnn_runs(checkpoint: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """ncnn, its graphs made by pnnx from the network in PyTorch. One image or RoI at a time: ncnn knows no batches."""
+    """Returns ncnn, whose graphs pnnx converts from PyTorch. It takes one image or RoI at a time, because ncnn has no
+    batches."""
     import ncnn
     import pnnx
 
@@ -204,7 +206,7 @@ def ncnn_runs(checkpoint: Path, feeds: dict[str, Feed], threads: int) -> tuple[s
 
 
 def _silently(work: Callable[[], object]) -> None:
-    """Runs `work` without what it prints, from C++ too."""
+    """Runs `work` without its output, including output of C++ code."""
     sys.stdout.flush()
     kept = os.dup(1), os.dup(2)
     with open(os.devnull, "w") as nowhere:
@@ -218,7 +220,7 @@ def _silently(work: Callable[[], object]) -> None:
 
 
 def prepare(int8: Path, float32: Path, checkpoint: Path, feeds: dict[str, Feed], threads: int) -> list[Runtime]:
-    """All runtimes with their graphs loaded; those that cannot be say why."""
+    """Loads the graphs in all runtimes; a runtime that cannot load them records why."""
     makers = {
         ("Maquette", "int8"): lambda: maquette_runs(int8, feeds, threads),
         ("Maquette", "fp32"): lambda: maquette_runs(float32, feeds, threads),
@@ -236,14 +238,14 @@ def prepare(int8: Path, float32: Path, checkpoint: Path, feeds: dict[str, Feed],
             runtime.version, runtime.runs = make()
         except ImportError as error:
             runtime.missing = f"not installed ({error.name}); scripts/make-venv.sh train,bench installs it"
-        except Exception as error:  # whatever stops another runtime is its finding here, not our failure
+        except Exception as error:  # any failure of another runtime is a result, not an error of this program
             runtime.missing = " ".join(str(error).split())[:200] or type(error).__name__
         runtimes.append(runtime)
     return runtimes
 
 
 def compare_outputs(runtimes: list[Runtime]) -> None:
-    """Runtimes whose results are not ours are struck out: their time would be that of another computation."""
+    """Removes runtimes with other results than ours, because they compute something else."""
 
     def results(runner: Runner) -> list[np.ndarray]:
         runner.run()
@@ -253,7 +255,7 @@ def compare_outputs(runtimes: list[Runtime]) -> None:
         runtime.precision: {name: results(runner) for name, runner in runtime.runs.items()} for runtime in runtimes[:2]
     }
     for runtime in runtimes[2:]:
-        # int8 sums are exact, but each runtime rounds scales and fuses in its own way.
+        # int8 sums are exact, but each runtime rounds scales and fuses layers in its own way.
         limit = TOLERANCE if runtime.precision == "fp32" else 10 * TOLERANCE
         for name, runner in runtime.runs.items():
             for expected, actual in zip(ours[runtime.precision][name], results(runner), strict=True):
@@ -266,8 +268,8 @@ def compare_outputs(runtimes: list[Runtime]) -> None:
 
 
 def time_alternately(runtimes: list[Runtime], rounds: int, block: int) -> None:
-    """Fills `ms`. In each round every runtime runs each graph once to wake up, then `block` times; the block's median
-    counts."""
+    """Fills `ms`. In each round every runtime runs each graph once to warm up, then `block` times; the median of the
+    block counts."""
     times: dict[tuple[int, str], list[float]] = {}
     for _ in tqdm(range(rounds), desc="runtimes", unit="round", disable=None):
         for name in runtimes[0].runs:
@@ -287,7 +289,8 @@ def time_alternately(runtimes: list[Runtime], rounds: int, block: int) -> None:
 
 
 def rows_of(runtimes: list[Runtime]) -> list[dict]:
-    """What a document says of each; the first is ours in int8, whose time for the same graphs is divided by theirs."""
+    """Returns the rows of a document. The first is ours in int8; its time for the same graphs is divided by that of
+    each other runtime."""
     rows = []
     for runtime in runtimes:
         row = {key: getattr(runtime, key) for key in ("name", "version", "precision", "ms", "missing")}
@@ -301,7 +304,7 @@ def rows_of(runtimes: list[Runtime]) -> list[dict]:
 def measure(
     int8: Path, float32: Path, checkpoint: Path, threads: int = 2, rounds: int = 15, block: int = 7
 ) -> dict[str, object]:
-    """The document of this module: the runtimes and, for each, the ratio of our time to theirs."""
+    """Returns the document: the runtimes and, for each, the ratio of our time to its time."""
     feeds = feeds_of(open_bundle(int8), four_by_three())
     runtimes = prepare(int8, float32, checkpoint, feeds, threads)
     compare_outputs(runtimes)

@@ -1,8 +1,8 @@
-"""What an app pays before its first picture: libraries that are loaded, their size, and the CPU time of a start.
+"""Measures the start of an app before its first image: loaded libraries, their size, and the CPU time of a process.
 
-    python -m benchmarks --only start     a few seconds; `make bench` builds what is needed
+    python -m benchmarks --only startup     a few seconds; `make bench` builds the program
 
-Measured by a small C program, benchmarks/native/measure_startup.c, in a process of its own each time.
+The C program benchmarks/native/measure_startup.c runs in a new process each time.
 """
 
 from __future__ import annotations
@@ -26,19 +26,20 @@ NAMES = {"context": "a context alone", "densepose": "a dense pose model, to the 
 
 
 def library_files() -> dict[str, Path]:
-    """What is shipped: libmaquette, and the part that reads files and clips, which is loaded when one is opened."""
+    """Returns the shipped libraries: libmaquette, and the part that reads files and clips, which is loaded on
+    demand."""
     library = library_path().resolve()
     return {"library": library, "files_library": library.parent / "maquette/libmaquette_files.so"}
 
 
 def needed(library: Path) -> list[str]:
-    """The shared libraries that a library names (NEEDED). Raises FileNotFoundError, CalledProcessError."""
+    """Returns the shared libraries that a library names (NEEDED). Raises FileNotFoundError, CalledProcessError."""
     shown = subprocess.run(["readelf", "--dynamic", "--wide", str(library)], check=True, capture_output=True, text=True)
     return re.findall(r"\(NEEDED\).*\[(.+)\]", shown.stdout)
 
 
 def start(kind: str) -> dict:
-    """`libraries` and `cpu_ms` of one process. Raises FileNotFoundError, CalledProcessError."""
+    """Returns `libraries` and `cpu_ms` of one process. Raises FileNotFoundError, CalledProcessError."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is not there: make bench builds it")
     ran = subprocess.run([str(PROGRAM), kind], check=True, stdout=subprocess.PIPE, text=True)
@@ -46,7 +47,7 @@ def start(kind: str) -> dict:
 
 
 def measure(quick: bool) -> tuple[dict, dict[str, float]]:
-    """What was measured, and the metrics that are targets."""
+    """Returns the document, and the metrics with a target."""
     others = OthersFraction()
     starts: dict[str, list[dict]] = {kind: [] for kind in NAMES}
     for _ in tqdm(range(3 if quick else STARTS), desc="starts", unit="round", disable=None):
@@ -72,7 +73,7 @@ def metrics_of(document: dict) -> dict[str, float]:
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what `measure` returned."""
+    """Returns the title and the parts of the section, from a document of `measure`."""
     processes = [["process with", "shared libraries", "CPU time, ms (median)", "worst", "runs", "names"]]
     for kind, name in NAMES.items():
         process = measured["processes"][kind]

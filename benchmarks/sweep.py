@@ -1,4 +1,4 @@
-"""Error against run time: what each setting of dense pose costs and saves, on rendered people that no training saw."""
+"""Measures error against run time for settings of dense pose, on rendered people that no training saw."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from export.evaluation.measure import Tally
 from export.evaluation.surface_accuracy import SurfaceTable
 from export.shards import LabelledImage
 
-SCORE_FLOOR = 0.05  # boxes below it enter no figure
-BLOCK = 10  # images that one setting works on before the next one's turn
-MOTION = 0.01  # of the picture's width and a frame, where people are followed
+SCORE_FLOOR = 0.05  # boxes with a lower score are ignored
+BLOCK = 10  # images that one setting processes before the next setting's turn
+MOTION = 0.01  # fraction of the image width a frame, for moving images
 
 
 @dataclass(frozen=True)
 class Setting:
-    """axis: which option is varied. bundle: "int8" or "fp32". options: fields of maq_densepose_config."""
+    """axis: the varied option. bundle: "int8" or "fp32". options: fields of maq_densepose_config."""
 
     name: str
     axis: str
@@ -34,12 +34,12 @@ class Setting:
 
     @property
     def frames(self) -> int:
-        """Of each moving picture: as many as from one key frame to the last that follows it."""
+        """Returns the number of frames of a moving image: from one key frame to the last frame that follows it."""
         return self.options.get("key_frame_interval", 1)
 
 
 def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> list[Setting]:
-    """What is measured. The first is the shipped bundle as it is."""
+    """Returns the measured settings. The first is the shipped bundle with default options."""
     made = [Setting("as shipped", "shipped"), Setting("fp32", "precision", "fp32")]
     made += [Setting(f"{side} px", "input size", options={"long_side_px": side}) for side in long_sides]
     made += [Setting(f"fp32, {side} px", "precision", "fp32", {"long_side_px": side}) for side in (192, 384)]
@@ -64,8 +64,8 @@ def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> li
 
 @dataclass
 class Measured:
-    """ms: milliseconds of a frame, median; of a moving picture the mean over its frames. error: 1 - AP by GPS.
-    error_cm: median surface error of painted pixels."""
+    """ms: median milliseconds of a frame, for a moving image the mean over its frames. error: 1 - AP by GPS. error_cm:
+    median surface error of labelled pixels."""
 
     setting: Setting
     ms: float
@@ -77,7 +77,7 @@ class Measured:
 
 
 def moving(image: np.ndarray, frames: int) -> Iterator[np.ndarray]:
-    """`frames` pictures that move by MOTION of the width each, the last of which is `image`."""
+    """Returns `frames` images that move by MOTION of the width each; the last one is `image`."""
     height, width = image.shape[:2]
     for k in range(frames - 1, 0, -1):
         shift = np.float64([[1, 0, -k * MOTION * width], [0, 1, 0]])
@@ -86,13 +86,13 @@ def moving(image: np.ndarray, frames: int) -> Iterator[np.ndarray]:
 
 
 class Column:
-    """One setting with its results, image by image."""
+    """One setting with its results for each image."""
 
     def __init__(self, setting: Setting, bundle: Path, threads: int) -> None:
         self.setting = setting
         options = dict(setting.options)
         self._densepose = DensePose(bundle, score_threshold=SCORE_FLOOR, threads=threads, **options)
-        # Time is that of an app, which does not ask for boxes below the shown score.
+        # The time is measured as in an app, which does not ask for boxes below the shown score.
         self._timed = DensePose(bundle, threads=threads, **options)
         self.ms: list[float] = []
         self._results: list[tuple] = []
@@ -118,7 +118,7 @@ class Column:
 
 
 class Replay:
-    """A backend (export.evaluation.backends) that gives what was found before."""
+    """A backend (export.evaluation.backends) that returns stored results."""
 
     kind = "capi"
 
@@ -138,7 +138,7 @@ def measure(
     threshold: float,
     threads: int = 2,
 ) -> list[Measured]:
-    """All settings on the same images, alternately, BLOCK images each. The first image of a block is not timed."""
+    """Runs all settings on the same images, alternately, BLOCK images each. The first image of a block is not timed."""
     columns = [Column(setting, bundles[setting.bundle], threads) for setting in wanted]
     with tqdm(total=len(images) * len(columns), desc="error against run time", unit="image", disable=None) as progress:
         for start in range(0, len(images), BLOCK):
@@ -169,7 +169,7 @@ def measure(
 
 
 def pareto(points: list[tuple[float, float]]) -> list[int]:
-    """Which (run time, error) no other beats in both, by rising run time."""
+    """Returns the indices of the Pareto front of (run time, error), by increasing run time."""
     front, least = [], float("inf")
     for k in sorted(range(len(points)), key=lambda k: points[k]):
         if points[k][1] < least:

@@ -1,7 +1,7 @@
-"""The graphs of a dense pose bundle as TensorFlow Lite files, which LiteRT runs with the kernels of XNNPACK.
+"""Converts the graphs of a dense pose bundle to TensorFlow Lite files, which LiteRT runs with the kernels of XNNPACK.
 
-Sizes are fixed, maps are channels last (transposes vanish), and 8-bit activations become signed: 128 less, as is their
-zero point, which is the same number. Weights, scales and the order of the layers stay.
+Sizes are fixed. Maps are channels last, so that transposes vanish. 8-bit activations become signed: values and zero
+points decrease by 128. Weights, scales and the order of the layers stay.
 """
 
 from __future__ import annotations
@@ -16,8 +16,13 @@ from ai_edge_litert import schema_py_generated as tfl
 from onnx import helper, numpy_helper, shape_inference
 
 Feed = dict[str, np.ndarray]
-IMAGE = "image"  # the only input whose channels come first in ONNX
-VERSIONS = {"RESHAPE": 1, "CONV_2D": 3, "DEPTHWISE_CONV_2D": 3, "FULLY_CONNECTED": 5}  # of operators; others 2
+IMAGE = "image"  # the only input with channels first in ONNX
+VERSIONS = {
+    "RESHAPE": 1,
+    "CONV_2D": 3,
+    "DEPTHWISE_CONV_2D": 3,
+    "FULLY_CONNECTED": 5,
+}  # versions of operators; others have version 2
 TYPES = {"float32": tfl.TensorType.FLOAT32, "int8": tfl.TensorType.INT8, "int32": tfl.TensorType.INT32}
 
 
@@ -27,10 +32,10 @@ def to_channels_last(shape: list[int]) -> list[int]:
 
 @dataclass
 class Writer:
-    """A model with one subgraph, tensor by tensor and operator by operator."""
+    """Builds a model with one subgraph from tensors and operators."""
 
     graph: tfl.SubGraphT = field(default_factory=tfl.SubGraphT)
-    buffers: list = field(default_factory=lambda: [tfl.BufferT()])  # the first is empty, by the format
+    buffers: list = field(default_factory=lambda: [tfl.BufferT()])  # the format requires an empty first buffer
     codes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -38,7 +43,8 @@ class Writer:
 
     def tensor(self, name: str, shape: list[int], kind: str, scale: tuple | None = None, data: np.ndarray | None = None,
                axis: int = 0) -> int:  # fmt: skip
-        """Adds a tensor; its index. scale: (scales [K], zero points [K]) along `axis`. data: of a constant."""
+        """Adds a tensor and returns its index. scale: (scales [K], zero points [K]) along `axis`. data: values of a
+        constant."""
         tensor = tfl.TensorT()
         tensor.name, tensor.shape, tensor.type = name, [int(size) for size in shape], TYPES[kind]
         tensor.buffer = 0
@@ -86,7 +92,7 @@ class Writer:
 
 
 class Converter:
-    """One ONNX graph at the sizes of `feed`."""
+    """Converts one ONNX graph at the sizes of `feed`."""
 
     def __init__(self, path: Path, feed: Feed) -> None:
         model = onnx.load(path)
@@ -105,12 +111,12 @@ class Converter:
             for name in node.input:
                 self.consumers.setdefault(name, []).append(node)
         self.writer = Writer()
-        self.tensors: dict[str, int] = {}  # of each value, by its name in ONNX
-        self.last: set[str] = set()  # values whose channels are last in ONNX, too
+        self.tensors: dict[str, int] = {}  # tensor index by the value's name in ONNX
+        self.last: set[str] = set()  # values that have channels last in ONNX too
         self.aliases: dict[str, str] = {}
 
     def constant(self, name: str) -> np.ndarray | None:
-        """The number or array that a value always is; quantized ones as they come back."""
+        """Returns the value of a constant; quantized constants are dequantized."""
         if name in self.constants:
             return self.constants[name]
         node = self.producers.get(name)
@@ -131,12 +137,12 @@ class Converter:
         return np.clip(np.rint(x / scale) + zero, limits.min, limits.max).astype(zero.dtype)
 
     def scale(self, node: onnx.NodeProto) -> tuple:
-        """Scale and zero point of a node that quantizes activations, the zero point for signed numbers."""
+        """Returns scale and zero point of a node that quantizes activations; the zero point is for signed numbers."""
         scale, zero = self.constant(node.input[1]), self.constant(node.input[2])
         return scale, int(zero) - (128 if zero.dtype == np.uint8 else 0)
 
     def convert(self) -> bytes:
-        """Raises ValueError for what it does not know."""
+        """Converts one node. Raises ValueError for an unknown operator."""
         for value in self.graph.input:
             shape = self.shapes[value.name]
             if value.name != IMAGE:
@@ -183,9 +189,8 @@ class Converter:
         self.tensors[node.output[0]] = out
 
     def dequantize(self, node: onnx.NodeProto) -> None:
-        """The 8-bit numbers stay; what needs floats makes them so. Where the scale is another than that of the numbers,
-        which is how the bundle multiplies by a constant, the format needs a product.
-        """
+        """Keeps 8-bit numbers and dequantizes for operators that need floats. If the scale differs from that of the
+        numbers, a product is added: the bundle multiplies by constants in this way."""
         source, (scale, zero) = self.tensors[node.input[0]], self.scale(node)
         found = self.writer.scale_of(source)
         if np.isclose(found[0][0], scale, rtol=1e-6, atol=0) and found[1][0] == zero:
@@ -201,7 +206,7 @@ class Converter:
         self.tensors[node.output[0]] = out
 
     def end_of(self, node: onnx.NodeProto) -> tuple[onnx.NodeProto, int]:
-        """The node whose output ends this operator, and its activation: a ReLU or a clip to 6 belongs to it."""
+        """Returns the node whose output ends this operator, and its activation: a ReLU or a clip to 6 is fused."""
         none, relu = tfl.ActivationFunctionType.NONE, tfl.ActivationFunctionType.RELU
         following = self.consumers.get(node.output[0], [])
         if len(following) != 1 or following[0].op_type not in ("Clip", "Relu"):
@@ -214,7 +219,8 @@ class Converter:
 
     def inputs_and_output(self, node: onnx.NodeProto, names: list[str], end: onnx.NodeProto,
                           shape: list[int] | None = None) -> tuple[list[int], int]:  # fmt: skip
-        """Tensors of the inputs, as 8-bit numbers where the result is quantized at once, else as floats; the output."""
+        """Returns the tensors of the inputs, as 8-bit numbers if the result is quantized at once, otherwise as floats;
+        and the output."""
         name = end.output[0]
         following = self.consumers.get(name, [])
         tensors = [self.tensors[x] for x in names]
@@ -246,7 +252,8 @@ class Converter:
         return out
 
     def weights(self, name: str, bias: str | None, source: int, order: list[int], axis: int) -> list[int]:
-        """Tensors of a layer's weight, its axes in `order`, and of its bias; of integers if `source` is of such."""
+        """Returns tensors of a layer's weight, with axes in `order`, and of its bias; integers if `source` has
+        integers."""
         weight = self.constant(name)
         count = weight.transpose(order).shape[axis]
         values = np.zeros(count, np.float32) if bias is None else self.constant(bias)
@@ -264,7 +271,7 @@ class Converter:
                 self.writer.tensor(f"{name}_bias", [count], "int32", (sums, 0), rounded)]  # fmt: skip
 
     def padded(self, node: onnx.NodeProto, source: int, attributes: dict) -> tuple[int, int]:
-        """The source, padded where the format's own paddings are others, and the padding that is left to the layer."""
+        """Returns the source, padded if the format has no such padding, and the padding for the layer."""
         pads, strides = list(attributes.get("pads", [0] * 4)), list(attributes.get("strides", [1, 1]))
         kernel, dilations = attributes["kernel_shape"], attributes.get("dilations", [1, 1])
         if not any(pads):
@@ -305,7 +312,7 @@ class Converter:
         self.writer.operator("DEPTHWISE_CONV_2D" if depthwise else "CONV_2D", [source, *weights], out, options)
 
     def dense(self, node: onnx.NodeProto) -> None:
-        """Gemm, or MatMul and the Add of its bias after it."""
+        """Converts Gemm, or MatMul with the Add of its bias."""
         gemm, end, bias = node.op_type == "Gemm", node, None
         if gemm:
             bias = node.input[2]
@@ -342,7 +349,7 @@ class Converter:
         self.writer.operator(kind.upper(), inputs, out, options)
 
     def same_scale(self, inputs: list[int], out: int) -> list[int]:
-        """The inputs with the scale of the output, which nodes that only move numbers ask for."""
+        """Returns the inputs with the scale of the output, which nodes that only move numbers need."""
         scale = self.writer.scale_of(out)
         found = []
         for index in inputs:
@@ -398,12 +405,12 @@ def attributes_of(node: onnx.NodeProto) -> dict:
 
 
 def channels_last(feed: Feed) -> list[np.ndarray]:
-    """The inputs as `from_onnx` takes them: the image, of the ONNX graph [1, 3, H, W], as [1, H, W, 3]."""
+    """Returns the inputs in the layout of `from_onnx`: the image [1, 3, H, W] of the ONNX graph as [1, H, W, 3]."""
     return [np.ascontiguousarray(x.transpose(0, 2, 3, 1)) if name == IMAGE else x for name, x in feed.items()]
 
 
 def from_onnx(path: Path, feed: Feed) -> bytes:
-    """A TensorFlow Lite file that computes what the ONNX graph computes, with inputs of the shapes of `feed`.
+    """Returns a TensorFlow Lite file with the function of the ONNX graph, for inputs with the shapes of `feed`.
 
     Maps of inputs and outputs are [N, H, W, C]. Raises ValueError for what the converter does not know.
     """

@@ -1,4 +1,5 @@
-"""What the user of an app with a window feels: until a live source or a scene is there, and a window that answers.
+"""Measures waits of a user of an app with a window: until a live source or a scene is shown, and in the window's
+thread.
 
     python -m benchmarks --only window    about a minute; `make bench` builds what is needed
 
@@ -38,7 +39,7 @@ DEMO_LIMIT_S = 300
 
 
 def run(program: str, *arguments: str) -> dict | list:
-    """The JSON of a program of benchmarks/native. Raises FileNotFoundError, CalledProcessError."""
+    """Runs a program of benchmarks/native and returns its JSON. Raises FileNotFoundError, CalledProcessError."""
     path = PROGRAMS / program
     if not path.exists():
         raise FileNotFoundError(f"{path} is not there: make bench builds it")
@@ -46,16 +47,15 @@ def run(program: str, *arguments: str) -> dict | list:
 
 
 def source_times(opened: dict) -> dict[str, float]:
-    """Of one call of open(): until the app is notified that the source is being opened and that it runs, until the
-    first result; from unplugging to the notification (`lost_ms`), from plugging in to the next result (`back_ms`); the
-    longest call.
+    """Returns times of one call of open(): until the app is notified of opening and of running, until the first result;
+    from unplugging to the notification (`lost_ms`), from plugging in to the next result (`back_ms`); the longest call.
 
     The source's time starts when it is open, a little after the app is notified that it is being opened: `lost_ms` and
     `back_ms` are too long by that. Raises ValueError when the source was not lost or did not come back.
     """
     times_ms: dict[str, list[float]] = {}
     for event in opened["events"]:
-        if event["name"] == "opening" or times_ms:  # before that: of the source that played until now
+        if event["name"] == "opening" or times_ms:  # earlier events belong to the source that played before
             times_ms.setdefault(event["name"], []).append(event["ms"])
     if not times_ms.keys() >= {"opening", "running", "result", "reconnecting"}:
         raise ValueError(f"a live source was not told of as lost, or gave no result: {opened['events']}")
@@ -71,7 +71,7 @@ def source_times(opened: dict) -> dict[str, float]:
 
 @contextmanager
 def display() -> Iterator[str]:
-    """A display in memory, its name. Raises FileNotFoundError when Xvfb does not start."""
+    """Starts a display in memory and returns its name. Raises FileNotFoundError if Xvfb does not start."""
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1600x1200x24", "-nolisten", "tcp", "-noreset"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
         try:
@@ -84,14 +84,14 @@ def display() -> Iterator[str]:
 
 
 def demo_missing() -> str:
-    """Why the demo cannot be measured, "" when it can."""
+    """Returns why the demo cannot be measured, "" if it can."""
     if not DEMO.exists():
         return "maquette-demo is not built (scripts/install-packages.sh desktop, make build)"
     return "" if shutil.which("Xvfb") else "there is no Xvfb (scripts/install-packages.sh test)"
 
 
 def demo_times(name: str, screen: str) -> dict:
-    """`longest_ms`, `p99_ms`, `frames`, `start_ms` of the window's thread, in one run of the demo."""
+    """Returns `longest_ms`, `p99_ms`, `frames`, `start_ms` of the window's thread in one run of the demo."""
     command = [str(DEMO), *DEMO_RUNS[name], "--headless"]
     ran = subprocess.run(command, env=os.environ | {"DISPLAY": screen}, check=True, stdout=subprocess.PIPE, text=True,
                          timeout=DEMO_LIMIT_S)  # fmt: skip
@@ -99,7 +99,7 @@ def demo_times(name: str, screen: str) -> dict:
 
 
 def measure(quick: bool) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the metrics that are targets, and why others are missing."""
+    """Returns the document, the metrics with a target, and why others are missing."""
     rounds = 1 if quick else 3
     measured: dict = {"first": [], "next": [], "scene": [], "capture": [], "demo": {}, "demo_missing": demo_missing()}
     others = OthersFraction()
@@ -141,7 +141,7 @@ def median(runs: list[dict], key: str) -> float:
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what `measure` returned."""
+    """Returns the title and the parts of the section, from a document of `measure`."""
     waits = [["from", "to", "median, ms", "worst", "runs"]]
 
     def add(begin: str, end: str, kind: str, key: str) -> None:
@@ -177,6 +177,6 @@ def section(measured: dict) -> tuple[str, list]:
     return "What an app with a window waits for", [
         *parts,
         window,
-        "Frames of the window's thread, from reading the input to showing the picture, while the networks run as fast "
+        "Frames of the window's thread, from reading the input to showing the image, while the networks run as fast "
         "as they can on threads of their own; on a display in memory (Xvfb), drawn by the processor.",
     ]

@@ -1,7 +1,7 @@
 """Ways to sharp pixels without a network: Canny on depth, angles between normals, surface variation.
 
 Each gives a strength per pixel; its settings and where it is cut are those of the smallest RMSE on validation views,
-level by level. The field is the distance to the pixels that are left, along the picture, in r of the pixel: with
+level by level. The field is the distance to the pixels that are left, along the image, in r of the pixel: with
 distances between points in space instead it was no better.
 """
 

@@ -153,7 +153,7 @@ def measure(
     given: Sources, folder: Path, threads: int, quick: bool, parts: Sequence[str] = PARTS, last: Mapping | None = None
 ) -> tuple[dict, dict[str, float], dict[str, str]]:
     """What was measured, the metrics that are targets, and why others are missing. last: the document of a run before,
-    from which parts come that are not measured. The sheet of pictures is written into `folder`: pictures are in no
+    from which parts come that are not measured. The sheet of images is written into `folder`: images are in no
     JSON."""
     document, networks = dict(last or {}), networks_of(given, folder)
     document.setdefault("warnings_of", {})

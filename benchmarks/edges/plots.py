@@ -1,4 +1,4 @@
-"""Pictures of the report about edges: error against time, error against noise, and a sheet of fields to look at."""
+"""Images of the report about edges: error against time, error against noise, and a sheet of fields to look at."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHEET = "edges-sheet.jpg"
 
 
 def write(measured: dict, folder: Path) -> list[Path]:
-    """The pictures of what was measured, into `folder`; the sheet has been written."""
+    """The images of what was measured, into `folder`; the sheet has been written."""
     drawn: dict[str, Callable[[dict], plt.Figure]] = {}
     if "speed" in measured:
         drawn["edges-error-against-run-time.png"] = error_against_time

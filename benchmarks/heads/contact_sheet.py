@@ -146,7 +146,7 @@ class Sources:
 
 
 def draw(measured: Mapping, bundle: Path, sources: Sources, out: Path, threads: int = 0) -> int:
-    """Draws heads that quality.py measured, and real ones, into a picture. Returns how many; where there are none,
+    """Draws heads that quality.py measured, and real ones, into an image. Returns how many; where there are none,
     nothing is written."""
     at_s = measured["at_s"]
     cases = rendered_cases(measured, sources.data, PhotoBackgrounds(sources.backgrounds), at_s)

@@ -1,4 +1,4 @@
-"""Pictures of fitted and true heads from chosen cameras, for looking at (Embree)."""
+"""Images of fitted and true heads from chosen cameras, for looking at (Embree)."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class DrawnMesh:
         return DrawnMesh(Scene(positions, faces, normals, np.zeros_like(positions), colours, everywhere))
 
     def colours(self, camera: Camera, behind: np.ndarray | None = None) -> np.ndarray:
-        """Without further light, uint8 RGB [H, W, 3]; behind: a picture of that size."""
+        """Without further light, uint8 RGB [H, W, 3]; behind: an image of that size."""
         rgb, present = self._lit(camera)
         return _before(rgb, present, behind)
 
@@ -109,7 +109,7 @@ def beside(camera: Camera, turn_deg: float, side_px: int) -> Camera:
 
 def framed(camera: Camera, box: np.ndarray, sides: float, side_px: int) -> tuple[Camera, np.ndarray]:
     """A square of `sides` times the box, in `side_px` pixels: its camera, and the affine map [2, 3] from its pixels to
-    those of the camera's picture."""
+    those of the camera's image."""
     left, top, right, bottom = box
     side = sides * max(right - left, bottom - top)
     zoom = side / side_px
@@ -126,7 +126,7 @@ def framed(camera: Camera, box: np.ndarray, sides: float, side_px: int) -> tuple
 
 
 def made_head(maker: HeadMaker, name: str, number: int, split: str = "test") -> tuple[HeadViews, Lamps]:
-    """The head of a file of `export.heads.view_shards`, and the light of its picture `number`."""
+    """The head of a file of `export.heads.view_shards`, and the light of its image `number`."""
     head = make_head(maker, split, int(name.rpartition("-")[2]))
     rng = np.random.default_rng([zlib.crc32(b"views"), int(name.rpartition("-")[2])])
     views = HeadViews(head, sample_extras(rng))

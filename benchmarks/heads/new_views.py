@@ -1,4 +1,4 @@
-"""New views of a head fitted to one photo beside pictures of the true head from there, in the photo's light: PSNR and a
+"""New views of a head fitted to one photo beside images of the true head from there, in the photo's light: PSNR and a
 distance by features inside of both silhouettes. The baseline is the mean head with the photo projected onto it by the
 true camera.
 
@@ -33,7 +33,7 @@ MIN_COSINE = 0.3  # to the ray: what is seen at a flatter angle the photo does n
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A true picture: camera in dm of the true head's frame, rgb uint8 [H, W, 3] before grey, mask bool [H, W]."""
+    """A true image: camera in dm of the true head's frame, rgb uint8 [H, W, 3] before grey, mask bool [H, W]."""
 
     camera: Camera
     rgb: np.ndarray
@@ -41,7 +41,7 @@ class View:
 
 
 def true_views(maker: HeadMaker, name: str, number: int, camera: Camera) -> list[View]:
-    """Of a made head, around from the camera of its picture `number`, in that picture's light."""
+    """Of a made head, around from the camera of its image `number`, in that image's light."""
     views, lamps = drawing.made_head(maker, name, number)
     found = []
     for turn in TURNS_DEG:

@@ -2,7 +2,7 @@
 
     python -m benchmarks.heads.other_heads --out .data/heads/other
 
-Nothing is trained on them: other shapes, photographed skins, hair as meshes with textures. Writes pictures as
+Nothing is trained on them: other shapes, photographed skins, hair as meshes with textures. Writes images as
 `export.heads.view_shards` does, without template points, and beside them the points of the surface that cameras see.
 """
 
@@ -130,7 +130,7 @@ def seen_points(head: OtherHead, count: int, rng: np.random.Generator) -> np.nda
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path(".data/heads/other"))
-    parser.add_argument("--views", type=int, default=8, help="pictures a head, from the front and sides")
+    parser.add_argument("--views", type=int, default=8, help="images a head, from the front and sides")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     people = unpacked(arguments.out)

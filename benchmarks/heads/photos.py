@@ -1,4 +1,4 @@
-"""Photos of heads whose shape is known, made from stored pictures (`export.heads.view_shards`, `other_heads`): in front
+"""Photos of heads whose shape is known, made from stored images (`export.heads.view_shards`, `other_heads`): in front
 of photographs without people, framed as cameras frame them, so that the principal point is the photo's middle."""
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Photo:
 
 @dataclass(frozen=True, eq=False)
 class TrueHead:
-    """Pictures of a head, and points of its surface."""
+    """Images of a head, and points of its surface."""
 
     name: str
     pictures: HeadPictures
@@ -51,12 +51,12 @@ class TrueHead:
     traits: Mapping[str, str] = field(default_factory=dict)  # what is known of it: hair, skin, glasses
 
     def front(self) -> int | None:
-        """The first picture from less than 45 degrees to the side; None: there is none."""
+        """The first image from less than 45 degrees to the side; None: there is none."""
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
         return next((k for k in shown if _is_from(self.pictures, k, -MAX_YAW_DEG, MAX_YAW_DEG)), None)
 
     def front_and_sides(self) -> tuple[int, int, int] | None:
-        """The first pictures from the front, the left and the right; None: one of these is missing."""
+        """The first images from the front, the left and the right; None: one of these is missing."""
         near, far = SIDE_YAW_DEG
         spans = ((-FRONT_YAW_DEG, FRONT_YAW_DEG), (near, far), (-far, -near))
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
@@ -64,7 +64,7 @@ class TrueHead:
         return None if None in found else tuple(found)
 
     def all_around(self, count: int) -> tuple[int, ...] | None:
-        """The first `count` pictures from anywhere; None: there are fewer."""
+        """The first `count` images from anywhere; None: there are fewer."""
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
         return tuple(shown[:count]) if len(shown) >= count else None
 
@@ -107,7 +107,7 @@ def _is_from(pictures: HeadPictures, k: int, low: float, high: float) -> bool:
 
 
 def _is_whole(pictures: HeadPictures, k: int) -> bool:
-    """Whether the picture shows the head and its border does not cut it off, but at the neck."""
+    """Whether the image shows the head and its border does not cut it off, but at the neck."""
     mask = pictures.masks[k] == HEAD
     return bool(mask.any() and not mask[0].any() and not mask[:, 0].any() and not mask[:, -1].any())
 
@@ -120,7 +120,7 @@ def camera_of(pictures: HeadPictures, k: int) -> Camera:
 
 
 def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng: np.random.Generator) -> Photo:
-    """Picture k as a camera takes it. What the picture shows of the bust goes on beyond its border."""
+    """Image k as a camera takes it. What the image shows of the bust goes on beyond its border."""
     camera, mask = camera_of(pictures, k), pictures.masks[k] == HEAD
     y, x = np.nonzero(mask)
     box = np.array([x.min(), y.min(), x.max() + 1, y.max() + 1], np.float64)
@@ -129,7 +129,7 @@ def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng:
     long = camera.fx_px / np.exp(rng.uniform(*np.log(FOCAL_OF_LONG_SIDE)))
     width = 2 * int(np.ceil(max(NARROW_BY_LONG * long / 2, reach[0])))
     height = 2 * int(np.ceil(max(long / 2, reach[1])))
-    # The picture moves by less than half a pixel, so that it need not be sampled anew; the camera knows of it.
+    # The image moves by less than half a pixel, so that it need not be sampled anew; the camera knows of it.
     left = round(camera.cx_px - (width - 1) / 2)
     top = round(camera.cy_px - (height - 1) / 2)
     side = pictures.rgb.shape[1]
@@ -148,14 +148,14 @@ def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng:
 
 
 def generator(name: str, k: int) -> np.random.Generator:
-    """Of what is random about a photo: depends on the head's name and the picture's number alone."""
+    """Of what is random about a photo: depends on the head's name and the image's number alone."""
     return np.random.default_rng([zlib.crc32(f"heads-report/{name}".encode()), k])
 
 
 def read_made_heads(
     data: Path, count: int | None = None, maker: HeadMaker | None = None, split: str = "test"
 ) -> list[TrueHead]:
-    """Heads of this project's maker: pictures in data/views, points in data/points. With the maker they are made again:
+    """Heads of this project's maker: images in data/views, points in data/points. With the maker they are made again:
     then points that cannot be seen from outside are left out, and surface and traits are known."""
     heads = []
     for path in sorted((data / "views" / split).glob("head-*[0-9].npz"))[:count]:
@@ -175,7 +175,7 @@ def read_made_heads(
         heads.append(TrueHead(path.stem, read_pictures(path), true, traits))
     if not heads:
         raise FileNotFoundError(
-            f"{data / 'views' / split} holds no pictures: run `python -m export.heads.view_shards {split}` and "
+            f"{data / 'views' / split} holds no images: run `python -m export.heads.view_shards {split}` and "
             f"`python -m export.heads.points {split}` first"
         )
     return heads

@@ -2,7 +2,7 @@
 
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
-In: `make build`, the bundle, pictures and points of test heads (`export.heads.view_shards test`, `export.heads.points
+In: `make build`, the bundle, images and points of test heads (`export.heads.view_shards test`, `export.heads.points
 test`), what they are made from (`export.people.assets`), heads of another maker (`benchmarks.heads.other_heads`),
 photos without people (`export.photos backgrounds`). Out: tables (Markdown) and all metrics (JSON). The library is given
 the head's box, and its focal length only with --known-focal.
@@ -58,7 +58,7 @@ SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 @dataclass(frozen=True, eq=False)
 class HeadSet:
-    """Heads, each with the numbers of the pictures that it is fitted to, at these times of fitting."""
+    """Heads, each with the numbers of the images that it is fitted to, at these times of fitting."""
 
     name: str
     heads: Sequence[tuple[TrueHead, Sequence[int]]]
@@ -223,7 +223,7 @@ def measure_set(
 
 
 def sets_of(options: argparse.Namespace, maker: HeadMaker | None = None) -> list[HeadSet]:
-    """The sets that are asked for and there, with the pictures that each head is fitted to."""
+    """The sets that are asked for and there, with the images that each head is fitted to."""
     made, seconds = read_made_heads(options.data, options.heads, maker), sorted(options.seconds)
     front = [(head, [k]) for head in made if (k := head.front()) is not None]
     found = []

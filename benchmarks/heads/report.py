@@ -159,7 +159,7 @@ def _more_parts(measured: Mapping, sheet: str) -> list[str]:
 
 
 def page(measured: Mapping, sheet: str = "") -> str:
-    """The whole report, Markdown. sheet: the picture's name, in the page's folder."""
+    """The whole report, Markdown. sheet: the image's name, in the page's folder."""
     at_s, bundles, machine = measured["at_s"], measured["bundles"], measured["machine"]
     rows = [row for row in measured["rows"] if row["bundle"] == bundles[0]]
     parts = [

@@ -1,1 +1,1 @@
-"""How alike predicted pictures are to the true ones, and how exact the motion behind them is."""
+"""Measures the similarity of predicted and true images, and the error of the estimated motion."""

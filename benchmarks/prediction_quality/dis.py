@@ -1,4 +1,4 @@
-"""OpenCV's optical flow (DIS, preset medium), and what it foresees at constant velocity."""
+"""Runs OpenCV's optical flow (DIS, preset medium), and extrapolates it at constant velocity."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import numpy as np
 
 
 class Dis:
-    """Of frames of one size."""
+    """Optical flow for frames of one size."""
 
     def __init__(self, height_px: int, width_px: int) -> None:
         self.flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
         self.y, self.x = np.mgrid[:height_px, :width_px].astype(np.float32)
 
     def motion(self, frame: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """From each pixel of a frame, BGR uint8 [H, W, 3], to where it is in the other: float32 [H, W, 2], pixels."""
+        """Returns the motion from each pixel of a frame, BGR uint8 [H, W, 3], to the other frame: float32 [H, W, 2],
+        pixels."""
         return self.flow.calc(*(cv2.cvtColor(one, cv2.COLOR_BGR2GRAY) for one in (frame, other)), None)
 
     def moved(self, frame: np.ndarray, to_before: np.ndarray, frames: float) -> np.ndarray:
-        """The frame so many frames later, fetched backward along its motion to the frame before it."""
+        """Returns the frame extrapolated by `frames`, warped backward along its motion to the frame before it."""
         x, y = self.x + frames * to_before[..., 0], self.y + frames * to_before[..., 1]
         return cv2.remap(frame, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

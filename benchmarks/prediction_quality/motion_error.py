@@ -1,6 +1,8 @@
-"""How far the motion that is found between two frames of a clip is from the exact one: endpoint error in pixels of
-320 x 240, where things move and can be seen in both. From a frame to the next, the way clips have it; predictors look
-from the newest frame to the one before."""
+"""Measures the endpoint error of the motion between two frames of a clip, in pixels of 320 x 240.
+
+Pixels count that move and are visible in both frames. Motion goes from a frame to the next one, as clips store it;
+predictors estimate it from the newest frame to the one before.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,13 @@ from benchmarks.prediction_quality.dis import Dis
 from export.clips.clip import Frames, read_clip
 
 PROGRAM = Path("build/release/benchmarks/native/find_motion")
-MIN_MOTION_PX = 0.5  # what moves by less from frame to frame does not count
+MIN_MOTION_PX = 0.5  # pixels with less motion from frame to frame do not count
 METHODS = {"still": "standing still", "motion": "motion", "dis": "OpenCV DIS"}
 
 
 def found_motion(bgr: np.ndarray) -> np.ndarray:
-    """As predictors find it, of frames uint8 [T, H, W, 3]: float32 [T - 1, H, W, 2]. Raises FileNotFoundError where the
-    program was not built, subprocess.SubprocessError where it fails."""
+    """Returns the motion that predictors estimate in frames uint8 [T, H, W, 3]: float32 [T - 1, H, W, 2]. Raises
+    FileNotFoundError without the program, subprocess.SubprocessError if it fails."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is missing: cmake --build --preset release --target find_motion")
     frames = np.ascontiguousarray(bgr)
@@ -32,13 +34,13 @@ def found_motion(bgr: np.ndarray) -> np.ndarray:
 
 
 def endpoint_errors(motion: np.ndarray, frames: Frames) -> np.ndarray:
-    """Of motion [T - 1, H, W, 2] against the exact one: pixels, of each that moves and stays visible."""
+    """Returns errors in pixels of motion [T - 1, H, W, 2], for each pixel that moves and stays visible."""
     moves = frames.visible & (np.hypot(*np.moveaxis(frames.motion, -1, 0)) >= MIN_MOTION_PX)
     return np.hypot(*(motion[moves] - frames.motion[moves]).T.astype(np.float64))
 
 
 def errors_of(frames: Frames) -> dict[str, tuple[float, float]] | None:
-    """Of a clip, by method: mean and median of endpoint errors; None where nothing moves."""
+    """Returns the mean and median endpoint error of a clip by method; None if nothing moves."""
     bgr = frames.rgb[..., ::-1]
     dis = Dis(*bgr.shape[1:3])
     motions = {
@@ -53,8 +55,8 @@ def errors_of(frames: Frames) -> dict[str, tuple[float, float]] | None:
 
 
 def measure(paths: Sequence[Path]) -> dict:
-    """Of clips that have frames of 320 x 240, means over clips: {"clips": count, method: [mean, median]}; the count
-    alone where there are none."""
+    """Returns means over the clips that have frames of 320 x 240: {"clips": count, method: [mean, median]}. Without
+    such clips only the count is returned."""
     larges = (read_clip(path).large for path in paths)
     found = [own for large in larges if large is not None if (own := errors_of(large)) is not None]
     return {"clips": len(found)} | {

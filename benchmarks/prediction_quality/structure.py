@@ -1,4 +1,4 @@
-"""SSIM of what is predicted of a clip, by method and time ahead."""
+"""Measures the SSIM of predicted frames by method and frames ahead."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.concealment import FIRST_START, START_STEP
 from benchmarks.prediction_quality.dis import Dis
 from export.scenes.picture_quality import ssim
 
-START_STEP_OF_SSIM = 2 * START_STEP  # it takes longer than the predictions
+START_STEP_OF_SSIM = 2 * START_STEP  # SSIM takes longer than the predictions
 
 
 MENDED = 1  # MAQ_NETWORK_MENDED
@@ -21,8 +21,8 @@ MENDED = 1  # MAQ_NETWORK_MENDED
 def structure_of(
     bgr: np.ndarray, fps: float, horizons: Sequence[int], bundle: Path, threads: int = 1
 ) -> dict[str, list[float]]:
-    """Of frames BGR uint8 [T, H, W, 3]: by method the mean SSIM of the pictures so many frames after the one that was
-    seen last. bundle: of the network that mends."""
+    """Returns the mean SSIM by method and frames ahead, for frames BGR uint8 [T, H, W, 3]. bundle: has the refining
+    network."""
     predictors = {name: maquette.Predictor(name, threads=threads) for name in ("last", "motion", "auto")}
     predictors["network"] = maquette.Predictor("network", network_mode=MENDED, bundle_path=bundle, threads=threads)
     rgb = np.ascontiguousarray(bgr[..., ::-1])

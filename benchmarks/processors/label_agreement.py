@@ -1,6 +1,6 @@
 """Compares the labels that `maquette densepose` gives on this processor with those on others, which qemu emulates.
 
-The same bundle and the same pictures on x86-64 with AVX2 but without VNNI (whose 8-bit products saturate), and on
+The same bundle and the same images on x86-64 with AVX2 but without VNNI (whose 8-bit products saturate), and on
 aarch64 without and with the dot product and matrix instructions. Needs both builds and Debian's qemu-user;
 `make test-isa` makes them and runs this.
 """
@@ -33,15 +33,15 @@ SAME_PERSON_IOU = 0.5
 
 EPILOG = """\
 examples:
-  python -m benchmarks.processors.label_agreement                                five bundled pictures, all processors
-  python -m benchmarks.processors.label_agreement --only avx2 my-photo.jpg       one processor, a picture of one's own
+  python -m benchmarks.processors.label_agreement                                five bundled images, all processors
+  python -m benchmarks.processors.label_agreement --only avx2 my-photo.jpg       one processor, an image of one's own
   python -m benchmarks.processors.label_agreement --bundle .data/bundles/other   another bundle
 """
 
 
 @dataclass
 class Agreement:
-    """How far the labels of two folders of results agree, over all pictures."""
+    """How far the labels of two folders of results agree, over all images."""
 
     pictures: int = 0
     people: int = 0  # of the reference
@@ -51,7 +51,7 @@ class Agreement:
     person_pixels: int = 0  # painted in either
     person_equal: int = 0
     worst_picture: float = 1.0  # the smallest fraction of equal pixels
-    box_px: float = 0.0  # largest difference of a coordinate of a matched box, pixels of the picture
+    box_px: float = 0.0  # largest difference of a coordinate of a matched box, pixels of the image
 
     @property
     def fraction(self) -> float:
@@ -64,8 +64,8 @@ class Agreement:
         return self.person_equal / self.person_pixels if self.person_pixels else 1.0
 
     def passes(self, bar: float) -> bool:
-        """Enough of all pixels are the same, and each person has a match. The worst picture is reported, not barred:
-        one value that float sums of another order push over a rounding step changes a picture of small people.
+        """Enough of all pixels are the same, and each person has a match. The worst image is reported, not barred:
+        one value that float sums of another order push over a rounding step changes an image of small people.
         """
         return self.fraction >= bar and self.unmatched == 0
 
@@ -85,16 +85,16 @@ def read_boxes(path: Path) -> np.ndarray:
 
 
 def compare(reference: Path, other: Path) -> Agreement:
-    """Compares two folders of results of the same pictures.
+    """Compares two folders of results of the same images.
 
-    Raises ValueError when they are not of the same pictures, or when the reference shows no people: then there is
+    Raises ValueError when they are not of the same images, or when the reference shows no people: then there is
     nothing to compare.
     """
     agreement = Agreement()
     names = sorted(path.name for path in reference.glob("*_IUV.png"))
     others = sorted(path.name for path in other.glob("*_IUV.png"))
     if names != others:
-        raise ValueError(f"{reference} has results of {len(names)} pictures, but {other} of {len(others)} or others.")
+        raise ValueError(f"{reference} has results of {len(names)} images, but {other} of {len(others)} or others.")
     for name in names:
         ours, theirs = read_parts(reference / name), read_parts(other / name)
         if ours.shape != theirs.shape:
@@ -109,12 +109,12 @@ def compare(reference: Path, other: Path) -> Agreement:
         stem = name.removesuffix("_IUV.png")
         compare_boxes(read_boxes(reference / f"{stem}.json"), read_boxes(other / f"{stem}.json"), agreement)
     if agreement.people == 0:
-        raise ValueError(f"{reference} shows no people, so there is nothing to compare. Take pictures of people.")
+        raise ValueError(f"{reference} shows no people, so there is nothing to compare. Take images of people.")
     return agreement
 
 
 def compare_boxes(ours: np.ndarray, theirs: np.ndarray, agreement: Agreement) -> None:
-    """Adds the people of one picture, boxes [N, 4] and [M, 4], to `agreement`; the most alike are the same person."""
+    """Adds the people of one image, boxes [N, 4] and [M, 4], to `agreement`; the most alike are the same person."""
     iou = box_iou(ours, theirs)
     matched = 0
     while iou.size and iou.max() >= SAME_PERSON_IOU:
@@ -140,7 +140,7 @@ def clip_frames(clip: Path, numbers: Sequence[int], folder: Path) -> list[str]:
 
 
 def run(processor: Processor, bundle: Path, sources: Sequence[str], out: Path) -> None:
-    """Writes the results of the pictures into `out`, which is emptied first. Raises ValueError with what went wrong."""
+    """Writes the results of the images into `out`, which is emptied first. Raises ValueError with what went wrong."""
     shutil.rmtree(out, ignore_errors=True)
     settings = ["--bundle", str(bundle), "--out", str(out), "--threads", "1", "--max-frames", str(STUB_FRAMES)]
     run_maquette(processor, ["densepose", *sources, *settings])
@@ -163,7 +163,7 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], bar: float) -
         table.add_row(name, str(found.people), str(found.unmatched), *fractions, f"{found.box_px:.2f}", verdict)
     Console(width=110).print(table)
     print(
-        f"same: pixels with the same part, of all (bar: {100 * bar:g} %); worst: of the worst picture; on people: of "
+        f"same: pixels with the same part, of all (bar: {100 * bar:g} %); worst: of the worst image; on people: of "
         "those painted in either;\nbox: the largest difference of a coordinate."
     )
 
@@ -192,7 +192,7 @@ def main(argv: list[str] | None = None) -> int:
     )
     parser.add_argument("--bundle", type=Path, default=ROOT / "sdk/models/densepose-b-int8")
     parser.add_argument(
-        "--bar", type=float, default=BAR, help="min. fraction of equal pixels, of all pictures (default %(default)s)"
+        "--bar", type=float, default=BAR, help="min. fraction of equal pixels, of all images (default %(default)s)"
     )
     add_arguments(parser, ROOT / "build/label-agreement")
     options = parser.parse_args(argv)

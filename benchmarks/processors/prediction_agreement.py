@@ -1,6 +1,6 @@
 """Compares the surprise and the likeliest coming frames of this processor with those on others, which qemu emulates.
 
-Bits of the first frames of a stream, and pictures that the shipped networks draw at temperature 0, on x86-64 with AVX2
+Bits of the first frames of a stream, and images that the shipped networks draw at temperature 0, on x86-64 with AVX2
 but without VNNI, and on aarch64 without and with the dot product and matrix instructions. Needs both builds and
 Debian's qemu-user; `make test-isa` makes them and runs this.
 """
@@ -48,7 +48,7 @@ def read_surprise(folder: Path) -> list[dict]:
 
 
 def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Of two pictures uint8 [H, W, 3], whose sides are multiples of CELLS: bool [CELLS, CELLS]."""
+    """Of two images uint8 [H, W, 3], whose sides are multiples of CELLS: bool [CELLS, CELLS]."""
     worst = np.abs(one.astype(int) - other.astype(int)).max(-1)
     height, width = worst.shape
     return worst.reshape(CELLS, height // CELLS, CELLS, width // CELLS).max((1, 3)) <= MAX_LEVELS
@@ -60,7 +60,7 @@ def compare(reference: Path, other: Path) -> PredictionAgreement:
     names, others = (sorted(path.name for path in folder.glob("*.png")) for folder in (reference, other))
     if not ours or not names or len(ours) != len(theirs) or names != others:
         raise ValueError(
-            f"{reference} has {len(ours)} frames and {len(names)} pictures, {other} {len(theirs)} and {len(others)}."
+            f"{reference} has {len(ours)} frames and {len(names)} images, {other} {len(theirs)} and {len(others)}."
         )
     differences = [abs(a["bits"] - b["bits"]) / a["bits"] for a, b in zip(ours, theirs, strict=True)]
     flags = [[frame[name] for frame in found for name in ("event", "cut", "start")] for found in (ours, theirs)]

@@ -1,4 +1,4 @@
-"""What the transformer draws of coming frames, beside the last frame and motion."""
+"""Measures frames that the transformer samples, beside the last frame and motion."""
 
 OF_TIMES = ("four_samples_times", "sampled_frames_a_second", "passes_frames_a_second", "recomputing_times")
 METRICS = (

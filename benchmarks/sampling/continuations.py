@@ -1,4 +1,4 @@
-"""Clips that go on from their first frames by each method."""
+"""Continues clips from their first frames by each method."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tqdm import tqdm
 
 from export.prediction.data import Clips
 
-GIVEN, MADE = 5, 11  # frames of a clip, as the published system has them
+GIVEN, MADE = 5, 11  # frames of a clip, as in the published system
 SAMPLES = 16
-PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # of what is drawn with few samples; 1 has SAMPLES
+PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # settings with few samples; temperature 1 has SAMPLES
 MENDED, DRAWN = 1, 3  # MAQ_NETWORK_MENDED, MAQ_NETWORK_DRAWN
 SEED = 1
 
-# Frames of a clip [GIVEN, H, W, 3], seconds between them -> pictures [samples, MADE, H, W, 3], and bits of their cells
-# [samples, MADE, 16, 16] or None.
+# Maps frames of a clip [GIVEN, H, W, 3] and the seconds between them to images [samples, MADE, H, W, 3], and to bits of
+# their cells [samples, MADE, 16, 16] or None.
 Method = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray | None]]
 
 
@@ -29,7 +29,7 @@ def shown(predictor: maquette.Predictor, frames: np.ndarray, step_s: float) -> N
 
 
 def foreseen(name: str, **settings: object) -> Method:
-    """By a method that draws nothing."""
+    """Returns a method that does not sample."""
     predictor = maquette.Predictor(method=name, threads=1, **settings)
 
     def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, None]:
@@ -40,7 +40,7 @@ def foreseen(name: str, **settings: object) -> Method:
 
 
 def drawn(samples: int, bundle: Path, **settings: float) -> Method:
-    """settings: temperature, top_k, passes."""
+    """Returns a sampling method. settings: temperature, top_k, passes."""
     predictor = maquette.Predictor(
         method="network", network_mode=DRAWN, bundle_path=bundle, threads=1, seed=SEED, **settings
     )
@@ -49,7 +49,7 @@ def drawn(samples: int, bundle: Path, **settings: float) -> Method:
         shown(predictor, frames, step_s)
         predictor.draw(samples, MADE, step_s)
         numbers = range(1, MADE + 1)
-        # Of one time after another: what is the same for all samples is then made once.
+        # One time after another, so that the work that all samples share is done once.
         pictures = np.stack([[predictor.drawn(s, k).pixels() for s in range(samples)] for k in numbers], 1)
         return pictures, np.stack([[predictor.uncertainty(s, k) for k in numbers] for s in range(samples)])
 
@@ -71,8 +71,8 @@ def methods(bundle: Path, samples: int) -> dict[str, Method]:
 
 
 def went_on(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """By method: pictures uint8 [clips, samples, MADE, H, W, 3], and where there are some bits of cells [clips,
-    samples, MADE, 16, 16]."""
+    """Returns by method: images uint8 [clips, samples, MADE, H, W, 3], and bits of cells [clips, samples, MADE, 16, 16]
+    if the method has them."""
     pictures: dict[str, list[np.ndarray]] = {}
     bits: dict[str, list[np.ndarray]] = {}
     known = methods(bundle, samples)

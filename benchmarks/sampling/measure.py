@@ -1,4 +1,4 @@
-"""What is drawn of coming frames: nearness to the truth, uncertainty, how real it looks, and times."""
+"""Measures sampled and refined frames: PSNR, uncertainty, realism and time."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
 from export.prediction.pictures.picture_error import psnr_db
 
-AHEAD = (1, 2, 4, 8, 11)  # frames, of tables
+AHEAD = (1, 2, 4, 8, 11)  # frames ahead in the tables
 FAR = slice(4, MADE)  # 5 to 11 frames ahead
 
 
 def psnr(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Of each picture [..., H, W, 3]: [...]."""
+    """Returns the PSNR of each image [..., H, W, 3]: [...]."""
     both = (torch.from_numpy(np.ascontiguousarray(a).reshape(-1, *a.shape[-3:])) for a in (pictures, truth))
     return psnr_db(*both).numpy().reshape(pictures.shape[:-3])
 
 
 def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
-    """By method [clips, MADE]: of several samples the first, their mean, and the best of so many for each frame."""
+    """Returns PSNR by method [clips, MADE]: of the first sample, of the mean of samples, and of the best of N samples
+    for each frame."""
     found = {name: psnr(own[:, 0], truth) for name, own in pictures.items()}
     samples = pictures["temperature 1"].shape[1]
     for name in [name for name in pictures if name.startswith("temperature")]:
@@ -39,14 +40,15 @@ def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str,
 
 
 def real_clips(data: Path, kind: str, count: int) -> np.ndarray:
-    """Frames of clips to train on, as many as are compared: uint8 [clips, MADE, 64, 64, 3]; spread over all."""
+    """Returns frames of training clips, as many as there are compared clips, spread evenly: uint8 [clips, MADE, 64, 64,
+    3]."""
     paths = clip_paths(data, kind, "train")
     chosen = [paths[k] for k in np.linspace(0, len(paths) - 1, count).astype(int)] if paths else []
     return np.stack([read_rgb(path)[0][GIVEN : GIVEN + MADE] for path in chosen]) if chosen else np.empty(0)
 
 
 def frechet_ratios(pictures: dict[str, np.ndarray], truth: np.ndarray, others: np.ndarray) -> dict[str, dict]:
-    """By kind of features, by method: the distance from the true clips as a share of the last frame's."""
+    """Returns the distance from the true clips as a ratio of the last frame's, by kind of features and method."""
     network = frechet.FrameFeatures()
     shown = {name: network.of(own[:, 0]) for name, own in pictures.items()}
     if len(others):
@@ -60,14 +62,15 @@ def frechet_ratios(pictures: dict[str, np.ndarray], truth: np.ndarray, others: n
 
 
 def clips_of(data: Path, kind: str, count: int | None) -> Clips:
-    """At most so many validation clips. Raises SystemExit where there are none."""
+    """Reads at most `count` validation clips. Raises SystemExit if there are none."""
     clips = read_clips(data, [kind], "val")
     count = min(count or len(clips), len(clips))
     return Clips(clips.frames[:count], clips.fps[:count], clips.names[:count])
 
 
 def uncertainties(clips: Clips, pictures: dict[str, np.ndarray], bits: dict[str, np.ndarray]) -> dict[str, tuple]:
-    """What says how uncertain a cell is, and the cell's error, by what is compared: [clips, MADE, 16, 16] twice."""
+    """Returns an uncertainty measure of each cell and the error of the cell, by comparison: [clips, MADE, 16, 16]
+    twice."""
     given, truth = (part.numpy() for part in clips.frames[:, : GIVEN + MADE].split((GIVEN, MADE), 1))
     drawn = bits["temperature 1"].mean(1)
     changed = np.broadcast_to(uncertainty.cell_errors(given[:, -2:-1], given[:, -1:]), drawn.shape)
@@ -115,6 +118,6 @@ def measure_pictures(
 
 
 def measure_times(clips: Clips, bundle: Path, threads: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Milliseconds by case, and their metrics."""
+    """Returns milliseconds by case, and the metrics of times."""
     found = times.times_ms(bundle, clips.frames[0].numpy(), 1 / float(clips.fps[0]), threads)
     return found, times.metrics_of(found)

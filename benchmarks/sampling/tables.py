@@ -1,4 +1,4 @@
-"""What was measured of drawn frames, as sentences and tables."""
+"""Writes the measured values of sampled frames as sentences and tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ Table = list[list[str]]
 
 
 def sampling_tables(document: dict) -> list[str | Table]:
-    """Sentences and tables of a document of measure_pictures(), and of times under "times_ms"."""
+    """Returns sentences and tables of a document of measure_pictures(), and of times under "times_ms"."""
     ahead = [str(k) for k in document["ahead"]]
     ratios = document["frechet"]
     parts: list[str | Table] = [
@@ -31,7 +31,7 @@ def sampling_tables(document: dict) -> list[str | Table]:
             ["", *ratios], {name: [own[name] for own in ratios.values()] for name in next(iter(ratios.values()))}, 2
         ),
     ]
-    if "gain_db" in document:  # a report measured before has none
+    if "gain_db" in document:  # an older document has none
         parts.append("Mean gain 5 to 11 frames ahead over the better of the last frame and motion, dB.")
         parts.append(_table(["", "dB"], {name: [own] for name, own in document["gain_db"].items()}, 2))
     if "times_ms" in document:

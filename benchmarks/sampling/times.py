@@ -1,4 +1,4 @@
-"""How long drawing takes beside one sample, one code after another."""
+"""Measures times of sampling, beside one sample that is decoded code after code."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ CASES = {  # samples, frames, passes
 }
 
 
-PLACES = 256  # of a frame
+PLACES = 256  # cells of a frame
 RECOMPUTING = "all places again for each, estimated"
 
 
 def times_ms(bundle: Path, frames: np.ndarray, step_s: float, threads: int = 1, rounds: int = 11) -> dict[str, float]:
-    """Median time of a draw, by case; the cases take turns. RECOMPUTING: of a frame whose places are drawn one after
-    another without what was computed before, by as many passes over all of them; from what a further pass takes."""
+    """Returns the median time of sampling by case; the cases alternate. RECOMPUTING estimates a frame without stored
+    keys and values: each cell would take a pass over all cells. It follows from the time of a further pass."""
     predictors = {}
     for passes in sorted({passes for _, _, passes in CASES.values()}):
         predictors[passes] = maquette.Predictor(
@@ -40,13 +40,13 @@ def times_ms(bundle: Path, frames: np.ndarray, step_s: float, threads: int = 1, 
         shown(predictors[passes], frames[:GIVEN], step_s)
     found: dict[str, list[float]] = {name: [] for name in CASES}
     for name, (samples, count, passes) in CASES.items():
-        predictors[passes].draw(samples, count, step_s)  # networks are opened, and memory is taken
+        predictors[passes].draw(samples, count, step_s)  # opens the networks and takes memory
         for _ in range(rounds):
             begin = time.perf_counter()
             predictors[passes].draw(samples, count, step_s)
             found[name].append(1e3 * (time.perf_counter() - begin))
     medians = {name: statistics.median(own) for name, own in found.items()}
-    further = predictors[16].stats["pass_count"] - 1  # fewer than 15 where drawing settled
+    further = predictors[16].stats["pass_count"] - 1  # fewer than 15 if sampling converged earlier
     a_pass = (medians["16 passes"] - medians["1 pass"]) / max(further, 1)
     return medians | {RECOMPUTING: medians["1 pass"] + (PLACES - 1) * a_pass}
 

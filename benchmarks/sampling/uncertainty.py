@@ -1,15 +1,15 @@
-"""Is a drawn frame wrong where it says that it is uncertain?"""
+"""Compares the uncertainty of a sampled frame with its error."""
 
 from __future__ import annotations
 
 import numpy as np
 
-CELLS = 16  # a side
+CELLS = 16  # cells a side
 
 
 def cell_errors(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Root of the mean squared error of each cell, grey levels: [..., H, W, 3] -> [..., 16, 16]; of what does not
-    divide into cells the rest is left out."""
+    """Returns the root mean squared error of each cell in grey levels: [..., H, W, 3] -> [..., 16, 16]. Rows and
+    columns that do not fill a cell are left out."""
     square = (pictures.astype(np.float32) - truth.astype(np.float32)) ** 2
     high, wide = square.shape[-3] // CELLS, square.shape[-2] // CELLS
     square = square[..., : CELLS * high, : CELLS * wide, :]
@@ -18,7 +18,7 @@ def cell_errors(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 def ranks(values: np.ndarray) -> np.ndarray:
-    """Of the last axis, from 0; equal ones share the mean of theirs."""
+    """Returns ranks along the last axis, from 0; equal values share their mean rank."""
     ordered = np.sort(values, -1)
     found = np.empty(values.shape)
     for at in np.ndindex(values.shape[:-1]):
@@ -28,19 +28,19 @@ def ranks(values: np.ndarray) -> np.ndarray:
 
 
 def rank_correlation(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Spearman's, along the last axis; 0 where all of a row are equal."""
+    """Returns Spearman's rank correlation along the last axis; 0 if all values of a row are equal."""
     a, b = (ranks(values) - (values.shape[-1] - 1) / 2 for values in (one, other))
     scale = np.sqrt((a**2).sum(-1) * (b**2).sum(-1))
     return np.divide((a * b).sum(-1), scale, out=np.zeros(scale.shape), where=scale > 0)
 
 
 def by_frame(bits: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Rank correlation of the cells of each frame: [..., 16, 16] twice -> [...]."""
+    """Returns the rank correlation of the cells of each frame: [..., 16, 16] twice -> [...]."""
     return rank_correlation(*(values.reshape(*values.shape[:-2], -1) for values in (bits, errors)))
 
 
 def reliability(bits: np.ndarray, errors: np.ndarray, bins: int = 5) -> list[tuple[float, float]]:
-    """Means of bits, and root mean squares of errors, of equally many cells, from the surest on."""
+    """Returns mean bits and root mean squared error of equally large groups of cells, the most certain group first."""
     order = np.argsort(bits, axis=None, kind="stable")
     parts = np.array_split(order, bins)
     return [(float(bits.flat[part].mean()), float(np.sqrt((errors.flat[part] ** 2).mean()))) for part in parts]

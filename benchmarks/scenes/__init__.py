@@ -1,1 +1,1 @@
-"""New views of captured places: quality, speed, memory."""
+"""Measures new views of captures: quality, speed, memory."""

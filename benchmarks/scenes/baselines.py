@@ -1,7 +1,7 @@
-"""Pictures of a place from a new side without any network, for comparison: the nearest photo, and its cloud's points.
+"""Renders captures from new views without a network, as baselines: the nearest photo, and the points of the cloud.
 
-All take a capture and a camera, and give RGB float32 [H, W, 3] in 0..1. What is behind the points is one colour: that
-of the photos where no point is.
+Each takes a capture and a camera, and returns RGB float32 [H, W, 3] in 0..1. The background is one colour: the mean of
+photo pixels that no point covers.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from export.scenes.fitting import View
 from export.scenes.geometry.raster import NOTHING, pyramid, visible
 from export.scenes.geometry.source_views import in_frame
 
-SCORED_POINTS = 2000  # of the cloud, enough to tell which photo is nearest
+SCORED_POINTS = 2000  # points that decide which photo is nearest
 BACKGROUND_PHOTOS = 3
-BACKGROUND_SIDE_PX = 160  # photos this small tell a mean colour
-SEEN_FRACTION = 0.02  # of the photos' pixels: with fewer that no point covers, these tell nothing of the background
+BACKGROUND_SIDE_PX = 160  # long side of photos for the mean colour
+SEEN_FRACTION = 0.02  # fraction of uncovered photo pixels; below it, photos give no background colour
 
 
 def moved_px(target: Camera, other: Camera, positions: np.ndarray) -> float:
-    """How far apart two cameras are: by how many pixels of the target the points [P, 3] in its frame move, on average.
+    """Returns the distance of two cameras: the mean motion in pixels of the points [P, 3] in the target's frame.
 
     A point that the other does not have in its frame counts as moved by the diagonal.
     """
@@ -48,7 +48,8 @@ def moved_px(target: Camera, other: Camera, positions: np.ndarray) -> float:
 
 
 def nearest_photo(capture: Capture, camera: Camera) -> np.ndarray:
-    """The source photo whose camera is nearest (`moved_px`), at the camera's size. Its own picture is not looked at."""
+    """Returns the source photo with the nearest camera (`moved_px`), at the camera's size. The photo of the camera
+    itself is not used."""
     positions = capture.cloud.positions
     scored = positions[:: max(1, len(positions) // SCORED_POINTS)]
     best = min(capture.sources(), key=lambda k: moved_px(camera, capture.cameras[k], scored))
@@ -62,26 +63,27 @@ def nearest_photo(capture: Capture, camera: Camera) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """positions: float64 [P, 3]; colours: float32 [P, 3]; behind: float32 [3], where no point is."""
+    """positions: float64 [P, 3]; colours: float32 [P, 3]; behind: float32 [3], the background colour."""
 
     positions: Tensor
     colours: Tensor
     behind: Tensor
 
     def points(self, camera: Camera) -> np.ndarray:
-        """One pixel a point, the nearest wins."""
+        """Draws one pixel a point; the nearest point is visible."""
         return self._painted(visible(self.positions, camera))
 
     def squares(self, camera: Camera, side_px: int = 3) -> np.ndarray:
-        """A square of `side_px` (odd) a point, the nearest wins. Points outside of the frame do not reach into it."""
+        """Draws a square of `side_px` (odd) a point; the nearest point is visible. Points outside the frame are left
+        out."""
         keys = visible(self.positions, camera)
         for axis in (0, 1):
             keys = _min_around(keys, side_px // 2, axis)
         return self._painted(keys)
 
     def pyramid(self, camera: Camera) -> np.ndarray:
-        """The five rasters that the refiner gets, here of the points' own colours: where a finer one has no point, the
-        next coarser shows, bilinearly."""
+        """Draws the five rasters of the refiner with the points' own colours: a pixel without a point at one level
+        shows the next coarser level, interpolated bilinearly."""
         wide, high = (-(-side // MULTIPLE) * MULTIPLE for side in (camera.width_px, camera.height_px))
         shown = pyramid(visible(self.positions, camera.reframed(0, 0, wide, high)), LEVELS)
         picture = self.behind[:, None, None].expand(3, high // MULTIPLE, wide // MULTIPLE)
@@ -107,8 +109,8 @@ def _min_around(keys: Tensor, radius_px: int, axis: int) -> Tensor:
 
 
 def cloud_of(capture: Capture) -> Cloud:
-    """The capture's points, and the colour behind them: the mean of what a few source photos show where no point is;
-    where points are all over them, the mean of the points."""
+    """Returns the points of the capture and the background colour: the mean of photo pixels without a point, or the
+    mean of the points if they cover all photos."""
     positions, colours = torch.from_numpy(capture.cloud.positions), torch.from_numpy(capture.cloud.colours)
     sources, shown, count = capture.sources(), [], 0
     for at in np.linspace(0, len(sources) - 1, min(BACKGROUND_PHOTOS, len(sources))).round().astype(int):

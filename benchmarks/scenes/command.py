@@ -1,8 +1,8 @@
-"""Drives `maquette scene build`, `render` and `info`, and checks what they say.
+"""Runs `maquette scene build`, `render` and `info`, and checks their JSON.
 
-What is read of their JSON: of build `cloud_points`, `points`, `view_dependent_points`, `bytes`, `seconds` (`total` and
-each stage) and `peak_memory_mib`; of render `views`, a list of `name` and `ms` (a table: `total`, and `project`,
-`shade`, `refine`, `resample`; medians over the repeats). Files are written by the commands themselves.
+Fields of build: `cloud_points`, `points`, `view_dependent_points`, `bytes`, `seconds` (`total` and each stage) and
+`peak_memory_mib`. Fields of render: `views`, a list of `name` and `ms` (a table of medians over the repeats: `total`,
+`project`, `shade`, `refine`, `resample`). The commands write their files themselves.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ import numpy as np
 from benchmarks import frame_time
 
 STAGES = ("project", "shade", "refine", "resample")
-LONGEST_S = 900  # of one command: then it hangs
+LONGEST_S = 900  # longest time of a command; after it, the command hangs
 
 
 class SceneCommandError(RuntimeError):
-    """A command failed or said something else than it should; the sentence tells which."""
+    """A command failed or its JSON lacks a field; the message says which."""
 
 
 @dataclass(frozen=True)
 class Built:
-    """cloud_points: that were read; points: of them in the file; view_dependent_points: of these, whose descriptor
-    depends on the view. seconds: by stage, with `total`. wall_s: of the whole process."""
+    """cloud_points: points read; points: points in the file; view_dependent_points: those with a view-dependent
+    descriptor. seconds: by stage, with `total`. wall_s: of the whole process."""
 
     cloud_points: int
     points: int
@@ -45,7 +45,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Rendered:
-    """ms: median over views, by stage, with `total`. pictures: RGB float32 [H, W, 3] in 0..1 by the photo's name.
+    """ms: median over views by stage, with `total`. pictures: RGB float32 [H, W, 3] in 0..1 by the photo's name.
     wall_s: of the whole process."""
 
     ms: dict[str, float]
@@ -54,7 +54,8 @@ class Rendered:
 
 
 def build(capture: Path, scene: Path, networks: Path, *options: str) -> Built:
-    """A scene file of a capture's source photos. Raises SceneCommandError, FileNotFoundError without the program."""
+    """Builds a scene file from the source photos of a capture. Raises SceneCommandError, FileNotFoundError without the
+    program."""
     said, wall_s = _run("build", str(capture), "--out", str(scene), "--bundle", str(networks), *options)
     try:
         seconds = {str(stage): _number(value) for stage, value in said["seconds"].items()}
@@ -71,7 +72,7 @@ def build(capture: Path, scene: Path, networks: Path, *options: str) -> Built:
 def render(
     scene: Path, networks: Path, capture: Path, folder: Path, views: Sequence[str] | str = "held-out", *options: str
 ) -> Rendered:
-    """Pictures of a scene from a capture's cameras, written into `folder`. views: names of photos, "held-out" or "all".
+    """Renders images of a scene from cameras of a capture into `folder`. views: names of photos, "held-out" or "all".
 
     Raises SceneCommandError, FileNotFoundError without the program.
     """
@@ -89,14 +90,14 @@ def render(
 
 
 def info(scene: Path) -> dict:
-    """What a scene file says of itself. Raises SceneCommandError, FileNotFoundError without the program."""
+    """Returns the information of a scene file. Raises SceneCommandError, FileNotFoundError without the program."""
     return _run("info", str(scene))[0]
 
 
 def _run(command: str, first: str, *arguments: str) -> tuple[dict, float]:
     if not frame_time.PROGRAM.exists():
         raise FileNotFoundError(f"{frame_time.PROGRAM} is not there: make build")
-    # Beside what it is about: a scene, or the folder to be written.
+    # Arguments beside the subject: the scene, or the output folder.
     path = Path(arguments[arguments.index("--out") + 1] if "--out" in arguments else first)
     path = path.with_name(f"{path.name}-{command}.json")
     path.unlink(missing_ok=True)
@@ -128,5 +129,5 @@ def _number(value: object) -> float:
 def _picture(path: Path) -> np.ndarray:
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
-        raise SceneCommandError(f"maquette scene render wrote no picture {path.name}")
+        raise SceneCommandError(f"maquette scene render wrote no image {path.name}")
     return np.ascontiguousarray(image[..., ::-1], np.float32) / 255

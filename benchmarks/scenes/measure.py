@@ -1,10 +1,10 @@
-"""Scenes: how near pictures from new sides are to photos, against the time to the first; time of frames; memory; bytes.
+"""Measures scenes: error of new views against the time to the first image; time of frames; memory; bytes.
 
     python -m benchmarks --only scenes            `make build` first
-    python -m benchmarks --only scenes --quick    two places, two photos of each, to see that it runs
+    python -m benchmarks --only scenes --quick    two captures, two photos of each, a smoke test
 
-Measured by `maquette scene` on rendered places that no training saw and on real ones, beside ways that need no network.
-A target that could not be measured is said to be so, with the reason.
+`maquette scene` runs on rendered captures that no training saw and on real ones, beside baselines without a network.
+The report names each target that could not be measured, with the reason.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ NETWORKS, FP32 = Path("sdk/models/scenes-int8"), Path(".data/bundles/scenes-fp32
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where places and networks are."""
+    """Adds arguments for captures and networks."""
     parser.add_argument("--places", type=Path, default=PLACES, metavar="DIR",
                         help=f"rendered places, made if not there; default: {PLACES}")  # fmt: skip
     parser.add_argument("--real", type=Path, nargs="+", metavar="DIR",
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def sources_of(options: argparse.Namespace) -> Sources:
-    """What the arguments say. Renders places where there are none."""
+    """Reads the arguments. Renders captures if there are none."""
     if not list(options.places.glob("*/transforms.json")):
         print(f"Rendering {MIN_PLACES} places into {options.places}: a quarter of an hour")
         for module in (["export.places.assets"], ["export.photos", "fetch"], ["export.people.assets"],
@@ -78,7 +78,7 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
 
 
 def warnings_of(places: list[dict], has_distance: bool) -> list[str]:
-    """What this run should have had and has not."""
+    """Returns warnings about missing captures."""
     warnings = [f"{place['name']} was left out: {place['missing']}" for place in places if "missing" in place]
     for real, wanted, kind in ((False, MIN_PLACES, "rendered"), (True, MIN_REAL, "real")):
         count = sum(place["real"] == real and "missing" not in place for place in places)
@@ -90,7 +90,7 @@ def warnings_of(places: list[dict], has_distance: bool) -> list[str]:
 
 
 def quality_figures(rows: list[dict], given: Sources) -> tuple[dict[str, float], dict[str, str]]:
-    """Those that the rows of rendered places tell, and why others are missing."""
+    """Returns the metrics with a target from the rows of rendered captures, and why others are missing."""
     found = {row["setting"]: row["rendered"] for row in rows}
     said = {row["setting"]: next(iter(row["missing"].values()), "there is no rendered place") for row in rows}
     metrics, missing = {}, {}

@@ -1,4 +1,4 @@
-"""Pictures of the report about scenes: error against time, time of frames, and a sheet to look at."""
+"""Draws the images of the section on scenes: error against time, time of frames, and a contact sheet."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ COLOURS = {"shipped": "black", "baseline": "0.5", "points": "tab:blue", "size": 
            "fine-tuned": "tab:purple"}  # fmt: skip
 ERRORS = (("psnr_db", "PSNR, dB"), ("ssim", "SSIM"), ("distance", "distance by features (lower is better)"))
 TITLES = {"as shipped": "ours"}
-NAMED = ("shipped", "baseline", "fine-tuned")  # in the plots, whether or not others are better
-SHEET = "scenes-sheet.jpg"  # photos: as PNG it would be eight times as large
+NAMED = ("shipped", "baseline", "fine-tuned")  # always named in the plots
+SHEET = "scenes-sheet.jpg"  # JPEG, since photos as PNG would be eight times as large
 MAX_ROWS = 6
 
 
 def write(measured: dict, folder: Path) -> list[Path]:
-    """Those of the pictures of which something was measured, into `folder`; the sheet has been written."""
+    """Writes the images of the measured values into `folder`; the contact sheet exists already."""
     drawn: dict[str, tuple[bool, Callable[[dict], plt.Figure]]] = {
         "scenes-quality.png": (any(row["rendered"] for row in measured["rows"]), quality),
         "scenes-frame-time.png": (bool(measured["speed"]), frame_time),
@@ -44,7 +44,7 @@ def write(measured: dict, folder: Path) -> list[Path]:
 
 
 def quality(measured: dict) -> plt.Figure:
-    # What is drawn at half the size is compared with smaller photos: another scale of errors.
+    # Settings at half size are left out: they are compared with smaller photos.
     rows = [row for row in measured["rows"] if row["axis"] in COLOURS and row["axis"] != "size"]
     rows = [row for row in rows if row["rendered"] and "first_image_s" in row["rendered"]]
     errors = [(key, label) for key, label in ERRORS if any(key in row["rendered"] for row in rows)]
@@ -92,7 +92,7 @@ def frame_time(measured: dict) -> plt.Figure:
                   if row["points"] == points]  # fmt: skip
         if len(chosen) > 2:
             axes[1].plot(*zip(*sorted(chosen), strict=True), "o-", label=f"{points:,} points")
-    axes[1].set(xlabel="megapixels of the picture", ylabel="milliseconds a frame (median)")
+    axes[1].set(xlabel="megapixels of the image", ylabel="milliseconds a frame (median)")
     axes[1].legend(fontsize=8)
     stages(axes[2], [row for row in of_usual if tuple(row["size_px"]) == TARGET_SIZE])
     for axis in axes[:2]:
@@ -117,7 +117,8 @@ def stages(axis: plt.Axes, rows: list[dict]) -> None:
 
 
 def write_sheet(shown: list[dict], rows: list[dict], folder: Path) -> Path | None:
-    """A row a place: its photo and what each way made of the same camera, with its PSNR. None without a place."""
+    """Writes a row for each capture: its photo and the image of each method from the same camera, with its PSNR.
+    Returns None without a capture."""
     if not shown:
         return None
     picked = [shown[k] for k in sorted({*np.linspace(0, len(shown) - 1, MAX_ROWS).round().astype(int).tolist()})]
@@ -130,7 +131,7 @@ def write_sheet(shown: list[dict], rows: list[dict], folder: Path) -> Path | Non
             picture = place["pictures"].get(name)
             metrics = by_name[name]["places"].get(place["name"], {})
             under = f"{metrics['shown_psnr_db']:.1f} dB" if picture is not None else "not measured"
-            # White where there is nothing: a plain colour could be taken for a picture.
+            # Cells without an image are white; another plain colour could be taken for an image.
             empty = np.ones_like(place["photo"])
             _cell(axis, empty if picture is None else picture, TITLES.get(name, name), under)
     for line in axes[1:]:

@@ -1,9 +1,8 @@
-"""Held-out photos against pictures of the same cameras: the error of each way to make them, and its time.
+"""Compares images with held-out photos of the same cameras: error of each method, and time to the first image.
 
-A row is one way. Its time to first image starts with the capture on disk, whose geometry (cameras and cloud) is given:
-reading, choosing or modelling, the first picture. Of ours it is that of two processes, `scene build` and then
-`scene render` of one view, their start, their networks and the written files included. The others run in Python, in a
-process that has begun, and make one picture.
+A row is one method. The time begins with the capture on disk, with given cameras and cloud, and includes reading,
+choosing or fitting, and the first image. For our scenes it covers two processes, `scene build` and `scene render` of
+one view, with their start, networks and written files. Baselines run in a Python process that has started already.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ from export.scenes.perceptual import Perceptual
 from export.scenes.picture_quality import psnr_db, ssim
 
 BASELINES = ("nearest photo", "plain points", "points as squares of 3 pixels", "pyramid of points")
-SHOWN = ("as shipped", *BASELINES[:2], BASELINES[3])  # in the sheet
+SHOWN = ("as shipped", *BASELINES[:2], BASELINES[3])  # captures in the contact sheet
 ERRORS = ("psnr_db", "ssim", "distance")
 
 
 class Photos:
-    """The held-out photos of a place, `count` at most, their sides divided by `shrink`.
+    """Returns at most `count` held-out photos of a capture, their sides divided by `shrink`.
 
     Raises CaptureError where there is none.
     """
@@ -63,10 +62,10 @@ class Photos:
 
 @torch.no_grad()
 def errors_of(pictures: Sequence[np.ndarray], photos: Photos, perceptual: Perceptual | None) -> dict[str, float]:
-    """Means over the photos. distance: of `export.scenes.perceptual`, where there is one."""
+    """Means over the photos. distance: by `export.scenes.perceptual`, if its network exists."""
     for picture, photo in zip(pictures, photos.images, strict=True):
         if picture.shape != photo.shape:
-            raise SceneCommandError(f"a picture has {picture.shape[1]} x {picture.shape[0]} pixels, not {photos.size}")
+            raise SceneCommandError(f"an image has {picture.shape[1]} x {picture.shape[0]} pixels, not {photos.size}")
     pairs = list(zip(pictures, photos.images, strict=True))
     found = {"psnr_db": statistics.fmean(psnr_db(a, b) for a, b in pairs),
              "ssim": statistics.fmean(ssim(a, b) for a, b in pairs)}  # fmt: skip
@@ -80,7 +79,7 @@ Row = dict  # setting, axis, kind, places (metrics by place), missing (why, by p
 
 
 def rows_of(settings: Sequence[Setting]) -> list[Row]:
-    """Empty ones, the baselines first."""
+    """Returns empty rows, the baselines first."""
     made = [{"setting": name, "axis": "baseline", "kind": "baseline"} for name in BASELINES]
     made += [{"setting": s.name, "axis": s.axis, "kind": "ours"} for s in settings]
     return [row | {"places": {}, "missing": {}} for row in made]
@@ -89,8 +88,8 @@ def rows_of(settings: Sequence[Setting]) -> list[Row]:
 def measure(
     sources: Sources, settings: Sequence[Setting], perceptual: Perceptual | None, quick: bool
 ) -> tuple[list[Row], list[dict], list[dict]]:
-    """Rows; the places (name, real, photos, points, size, or why it is `missing`); and for each of them one photo with
-    its pictures, to be looked at: name, photo, pictures by way."""
+    """Returns the rows; the captures (name, real, photos, points, size, or why it is `missing`); and for each capture
+    one photo with its images by method, for the contact sheet."""
     rows, places, shown = rows_of(settings), [], []
     folders = [(folder, False) for folder in sources.places] + [(folder, True) for folder in sources.real]
     with tqdm(total=len(folders) * (1 + len(settings)), desc="scenes", unit="setting", disable=None) as progress:
@@ -117,7 +116,8 @@ def measure(
 
 
 def mean_figures(row: Row, names: Sequence[str]) -> dict[str, float] | None:
-    """Over these places; None where one of them is missing: means over different places cannot be compared."""
+    """Returns means over these captures; None if one of them is missing, because means over different captures are not
+    comparable."""
     if not names or not set(names) <= set(row["places"]):
         return None
     found = [row["places"][name] for name in names]
@@ -126,8 +126,8 @@ def mean_figures(row: Row, names: Sequence[str]) -> dict[str, float] | None:
 
 
 class Place:
-    """One place, and what was found there: metrics or why there are none, by setting. The middle held-out photo is the
-    one to look at."""
+    """Measures one capture: metrics, or why there are none, by setting. The middle held-out photo is in the contact
+    sheet."""
 
     def __init__(self, folder: Path, perceptual: Perceptual | None, quick: bool) -> None:
         self.folder, self.name, self.quick, self._perceptual = folder, folder.resolve().name, quick, perceptual
@@ -178,7 +178,7 @@ class Place:
             self.found[name]["shown_psnr_db"] = psnr_db(picture, photo)
 
     def run_settings(self, sources: Sources, settings: Sequence[Setting], step: Callable[[], object]) -> None:
-        """Settings that need the same file follow one another and share it."""
+        """Sorts settings so that those with the same file follow each other and share it."""
         ordered = sorted(settings, key=_file_of)
         with tempfile.TemporaryDirectory() as name:
             for _, group in groupby(ordered, key=_file_of):
@@ -223,7 +223,7 @@ class Place:
             raise SceneCommandError(f"{scene} says that it has {points!r} points")
         size = scene.stat().st_size
         metrics = {"points": points, "bytes": size, "bytes_a_point": size / points}
-        # It begins with the scene as shipped.
+        # the first part is the setting as shipped
         if "as shipped" in self.found:
             metrics["build_s"] = self.found["as shipped"]["build_s"] + float(setting.tuned.removesuffix("s"))
         return scene, networks if networks.is_dir() else sources.bundles[SHIPPED], metrics
@@ -246,5 +246,5 @@ class Place:
 
 
 def _file_of(setting: Setting) -> tuple[bool, str, str, tuple[str, ...]]:
-    """What decides the scene file; fine-tuned ones come last."""
+    """Returns the options that decide the scene file; fine-tuned files come last."""
     return bool(setting.tuned), setting.tuned, setting.networks, setting.build

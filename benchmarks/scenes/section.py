@@ -1,4 +1,4 @@
-"""The part of the report that tells of scenes."""
+"""Writes the section "Scenes" of the report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SHIPPED = "as shipped"
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what scenes.measure returned."""
+    """Returns the title and the parts of the section, from a document of scenes.measure."""
     rows, speed = measured["rows"], measured["speed"]
     there = [place for place in measured["places"] if "missing" not in place]
     rendered, real = ([place for place in there if place["real"] == is_real] for is_real in (False, True))
@@ -28,9 +28,9 @@ def section(measured: dict) -> tuple[str, list]:
                 "without a network, the scene as shipped, and what no other beats in both.",
             ),
             error_rows(rows, "rendered"),
-            "First image: from the capture on disk, whose cameras and cloud are given, to a picture; two processes of "
+            "First image: from the capture on disk, whose cameras and cloud are given, to an image; two processes of "
             "the command line for ours, Python that has started for the ways without a network. Nearest photo: the "
-            "source photo whose camera is nearest, by how far the cloud's points move in the picture. Plain points: "
+            "source photo whose camera is nearest, by how far the cloud's points move in the image. Plain points: "
             "one pixel a point, the nearest in front; pyramid: where a finer raster has no point, the next coarser "
             "shows. Behind both is the mean colour of what photos show where no point is. PSNR and SSIM (11 x 11 "
             "Gaussian window, sigma 1.5, mean of the three channels) of RGB; every pixel counts, borders and "
@@ -65,7 +65,7 @@ def section(measured: dict) -> tuple[str, list]:
 
 
 def gain_over(rows: list[dict], way: str) -> float | None:
-    """Of the scene as shipped, dB, where both were measured on all rendered scenes."""
+    """Returns the gain in dB of the scene as shipped, if both were measured on all rendered captures."""
     found = {row["setting"]: row["rendered"] for row in rows}
     if not found.get(SHIPPED) or not found.get(way):
         return None
@@ -94,7 +94,7 @@ def error_rows(rows: list[dict], kind: str) -> list[list[str]]:
 
 
 def missing_lines(rows: list[dict]) -> list[str]:
-    """Reasons, with the settings that have each, one scene standing for all."""
+    """Returns reasons with their settings; one capture stands for all."""
     by_reason: dict[str, list[str]] = {}
     for row in rows:
         for reason in list(row["missing"].values())[:1]:
@@ -103,13 +103,13 @@ def missing_lines(rows: list[dict]) -> list[str]:
 
 
 def unseen_fraction(rows: list[dict]) -> float:
-    """Of the points of the clouds of the rendered scenes, as shipped."""
+    """Returns the fraction of cloud points without a descriptor in the rendered captures, as shipped."""
     metrics = next(row["rendered"] for row in rows if row["setting"] == SHIPPED)
     return 1 - metrics["points"] / metrics["cloud_points"]
 
 
 def place_rows(places: list[dict], rows: list[dict]) -> list[list[str]]:
-    """PSNR scene by scene, of the ways that are shown."""
+    """Returns PSNR by capture for the shown methods."""
     ways = [row for row in rows if row["axis"] in ("shipped", "baseline") and row["places"]]
     table = [["scene", "photos", "points of its cloud", *(f"{row['setting']}, dB" for row in ways)]]
     for place in places:
@@ -129,7 +129,7 @@ def saving_rows(rows: list[dict]) -> list[list[str]]:
     for setting, said in named:
         metrics = found.get(setting)
         if shipped and metrics:
-            # Bytes of what the scene as shipped has, however many points the other stores.
+            # Bytes relative to the scene as shipped, whose point count may differ.
             less = (shipped["bytes"] - metrics["bytes"]) / shipped["points"]
             table.append([said, _change(less, 1), _change(shipped["frame_ms"] - metrics["frame_ms"], 2),
                           _change(metrics["psnr_db"] - shipped["psnr_db"], 3)])  # fmt: skip

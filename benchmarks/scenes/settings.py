@@ -1,4 +1,4 @@
-"""What is measured of scenes: which networks, how the file is built from photos, how it is rendered."""
+"""Lists the measured settings: networks, options of `scene build`, options of `scene render`."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from pathlib import Path
 
 SHIPPED, FLOAT = "shipped", "float"
 POINTS = 500_000  # as shipped
-CONSTANT = "1e9"  # min. variation that no descriptor reaches: all keep their mean
+CONSTANT = "1e9"  # min. variation that no descriptor reaches, so that all keep their mean
 TUNED = {"10s": "10 s", "60s": "1 min", "600s": "10 min"}
 
 
 @dataclass(frozen=True)
 class Setting:
-    """axis: which option is varied. networks: SHIPPED, FLOAT, or the name of another bundle. build, render: options of
-    the commands. shrink: of the photos' sides. tuned: the file, where it is not built but fine-tuned elsewhere."""
+    """axis: the varied option. networks: SHIPPED, FLOAT, or the name of another bundle. build, render: options of the
+    commands. shrink: divisor of the photos' sides. tuned: a fine-tuned scene file, which is not built here."""
 
     name: str
     axis: str
@@ -29,9 +29,9 @@ class Setting:
 
 @dataclass(frozen=True)
 class Sources:
-    """places: rendered ones, real: captured ones, folders each (docs/formats.md). bundles: of networks, by SHIPPED,
-    FLOAT (the same networks in fp32) and others' names. tuned: folder of fine-tuned scenes, PLACE/10s.maqs and so on,
-    with PLACE/10s-networks beside them where the networks were tuned too."""
+    """places: folders of rendered captures, real: folders of real captures (docs/reference/formats.md). bundles: by
+    SHIPPED, FLOAT (the same networks in fp32) and names of others. tuned: folder of fine-tuned scenes, PLACE/10s.maqs
+    and so on, with PLACE/10s-networks beside them if the networks were tuned too."""
 
     places: list[Path]
     real: list[Path]
@@ -42,7 +42,8 @@ class Sources:
 def sources(
     places: Path, real: Sequence[Path], shipped: Path, fp32: Path, others: Sequence[Path], tuned: Path | None
 ) -> Sources:
-    """Of what is there: places in the folder `places`, by name. Raises ValueError where two bundles have one name."""
+    """Returns the existing sources: captures in the folder `places`, by name. Raises ValueError if two bundles have one
+    name."""
     names = [bundle_name(path) for path in others]
     if len({SHIPPED, FLOAT, *names}) < len(names) + 2:
         raise ValueError(f"bundles of networks need different names to be told apart; these are {', '.join(names)}")
@@ -51,7 +52,7 @@ def sources(
 
 
 def bundle_name(folder: Path) -> str:
-    """As its manifest says, or else the folder's name."""
+    """Returns the name in the manifest, or the folder's name."""
     try:
         return str(json.loads((folder / "manifest.json").read_text())["name"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -59,7 +60,7 @@ def bundle_name(folder: Path) -> str:
 
 
 def settings(bundles: Sequence[str]) -> list[Setting]:
-    """The first is the shipped one. bundles: names beside SHIPPED and FLOAT."""
+    """Returns the settings, the shipped one first. bundles: names besides SHIPPED and FLOAT."""
     all_points = ("--points", str(POINTS))
     made = [Setting("as shipped", "shipped")]
     made += [Setting(f"{n:,} points", "points", build=("--points", str(n))) for n in (50_000, 200_000)]
@@ -79,7 +80,7 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
 
 
 def savings() -> list[tuple[Setting, str]]:
-    """Work that a scene does not need, each done all the same; and what it is when it is not done. Two more are among
+    """Returns settings that do skippable work, with the name of the optimisation that skips it. Two more are among
     `settings`: "every descriptor varies" and "coefficients of 32 bits"."""
     axis = "not needed"
     return [

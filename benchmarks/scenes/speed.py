@@ -1,7 +1,7 @@
-"""Time of a frame of a scene against points, pixels and threads; time and memory of modelling it.
+"""Measures the time of a frame of a scene against points, pixels and threads; time and memory of building it.
 
-Measured on a rendered place, with a cloud of exactly as many points as wanted: random pixels of its source photos, at
-their depth. Points that win no pixel of any photo while modelling are dropped, so a scene has fewer than its cloud.
+The scene is a rendered capture whose cloud has exactly the wanted number of points: random pixels of its source photos
+at their depth. Points that are visible in no photo are dropped, so a scene has fewer points than its cloud.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SMALL_SIZE, SMALL_POINTS = (320, 240), 200_000
 
 
 def dense_cloud(place: Place, points: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """`points` random pixels of the source photos, where there is depth: float32 [P, 3] in the world, uint8 [P, 3].
+    """Returns `points` random pixels with depth of the source photos: float32 [P, 3] in the world, uint8 [P, 3].
 
     No pixel comes twice. Raises ValueError where there are fewer.
     """
@@ -53,26 +53,26 @@ def dense_cloud(place: Place, points: int, seed: int = 0) -> tuple[np.ndarray, n
 
 
 def chosen_place(folders: list[Path]) -> Place | None:
-    """The first with photos of 640 x 480, lying or upright, and as many source photos as the target asks for; a room if
+    """Returns the first capture with photos of 640 x 480, landscape or portrait, and enough source photos; a room if
     there is one."""
     found = []
     for folder in folders:
         try:
             place = load_place(folder)
         except PlaceError:
-            continue  # quality.py says what is wrong with it
+            continue  # quality.py reports the problem
         if is_size((place.images.width, place.images.height), TARGET_SIZE) and len(place.source) >= VIEWS:
             found.append(place)
     return min(found, key=lambda place: place.about.get("kind") != "room") if found else None
 
 
 def is_size(size: Sequence[int], wanted: tuple[int, int]) -> bool:
-    """Lying or upright."""
+    """Returns whether the size is the wanted one, landscape or portrait."""
     return tuple(sorted(size, reverse=True)) == wanted
 
 
 def measure(folders: list[Path], networks: Path, threads: int, quick: bool) -> tuple[dict, str]:
-    """`built` and `frames`, rows each, `missing`, and `place`; and why there is nothing ("" where there is)."""
+    """Returns `built` and `frames`, rows each, `missing`, and `place`; and why there is nothing ("" if there is)."""
     place = chosen_place(folders)
     if place is None:
         return {}, f"no rendered place has photos of 640 x 480 and {VIEWS} of them to build from"
@@ -96,7 +96,7 @@ def measure(folders: list[Path], networks: Path, threads: int, quick: bool) -> t
                 continue
             result["built"].append(built_row(points, built))
             for size, count in wanted_frames(points in clouds[-3:], threads):
-                # The command's own choice is all cores: what is usual is not asked for.
+                # all cores are the default of the command, so the option is left out
                 options = () if count == threads else ("--threads", str(count))
                 options += ("--size", "{}x{}".format(*(reversed(size) if upright else size)))
                 options += ("--repeat", "5" if quick else "31")
@@ -111,7 +111,7 @@ def measure(folders: list[Path], networks: Path, threads: int, quick: bool) -> t
 
 
 def wanted_frames(all_sizes: bool, threads: int) -> list[tuple[tuple[int, int], int]]:
-    """Size and threads of the frames that are timed."""
+    """Returns sizes and threads of the timed frames."""
     wanted = [(size, threads) for size in (SIZES if all_sizes else (SMALL_SIZE, TARGET_SIZE))]
     return wanted + [(TARGET_SIZE, 1)] if threads != 1 else wanted
 
@@ -149,7 +149,8 @@ def metrics_of(measured: dict) -> tuple[dict[str, float], dict[str, str]]:
 
 
 def memory_a_point(measured: dict) -> float | None:
-    """Bytes that each point of the cloud adds to the peak while modelling: from the smallest to the largest cloud."""
+    """Returns the bytes that each point of the cloud adds to the peak while building, from the smallest to the largest
+    cloud."""
     rows = sorted(measured.get("built", []), key=lambda row: row["cloud"])
     if len(rows) < 2:
         return None

@@ -1,8 +1,8 @@
-"""Ways to sharp pixels without a network: Canny on depth, angles between normals, surface variation.
+"""Finds sharp pixels without a network: Canny on depth, angles between normals, surface variation.
 
-Each gives a strength per pixel; its settings and where it is cut are those of the smallest RMSE on validation views,
-level by level. The field is the distance to the pixels that are left, along the image, in r of the pixel: with
-distances between points in space instead it was no better.
+Each method gives a strength per pixel. Its settings and threshold have the smallest RMSE on validation views, level by
+level. The field is the distance in the image to the nearest sharp pixel, in r of the pixel; distances in space were no
+better.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ import numpy as np
 
 from export.edges.config import EPS_R
 
-QUANTILES = np.linspace(0.5, 0.998, 20)  # of a strength, at which it is cut on validation views
-CANNY_STEPS = np.geomspace(0.2, 400, 28)  # r of depth a pixel, at which an edge begins
-_CANNY_UNIT = 64  # of the 16-bit gradients that cv2.Canny takes, a step of 1
+QUANTILES = np.linspace(0.5, 0.998, 20)  # quantiles of a strength, tried as thresholds on validation views
+CANNY_STEPS = np.geomspace(0.2, 400, 28)  # thresholds of an edge, in r of depth a pixel
+_CANNY_UNIT = 64  # scale of the 16-bit gradients of cv2.Canny
 
 
 def canny(depth: np.ndarray, focal_px: float, sigma_px: float, cuts: Sequence[float]) -> np.ndarray:
-    """cv2.Canny on the gradient of log depth, in r a pixel, after a Gaussian that leaves out unknown depth: [H, W], the
-    highest of the cuts at which a pixel is an edge, 0 where it is none; edges may go on down to half a cut."""
+    """Runs cv2.Canny on the gradient of log depth, in r a pixel, after a Gaussian that ignores unknown depth: [H, W],
+    the highest threshold at which a pixel is an edge, 0 for no edge. Hysteresis continues edges down to half of a
+    threshold."""
     known = (depth > 0).astype(np.float32)
     weight = cv2.GaussianBlur(known, (0, 0), sigma_px)
     log = np.log(np.where(depth > 0, depth, 1)).astype(np.float32) * known
     log = cv2.GaussianBlur(log, (0, 0), sigma_px) / np.maximum(weight, 1e-6)
-    # A Sobel filter answers 8 times the gradient.
+    # A Sobel filter returns 8 times the gradient.
     scale = focal_px / 8 * _CANNY_UNIT
     x, y = (np.clip(cv2.Sobel(log, cv2.CV_32F, *o, scale=scale), -32000, 32000) for o in ((1, 0), (0, 1)))
     x, y = x.astype(np.int16), y.astype(np.int16)
@@ -39,14 +40,15 @@ def canny(depth: np.ndarray, focal_px: float, sigma_px: float, cuts: Sequence[fl
 
 
 def points_of(depth: np.ndarray, focal_px: float) -> np.ndarray:
-    """[H, W, 3] in metres about the middle of the frame; 0 where depth is unknown."""
+    """Returns points [H, W, 3] in metres, relative to the middle of the frame; 0 for unknown depth."""
     height, width = depth.shape
     x, y = np.meshgrid(np.arange(width) - (width - 1) / 2, np.arange(height) - (height - 1) / 2)
     return np.stack([x * depth / focal_px, y * depth / focal_px, depth], -1).astype(np.float32)
 
 
 def normals_of(depth: np.ndarray, focal_px: float, method: str) -> np.ndarray:
-    """Of cv2.RgbdNormals, [H, W, 3], 0 where it finds none. method: "FALS" (fits to windows of 5 px), "LINEMOD"."""
+    """Returns normals of cv2.RgbdNormals, [H, W, 3], 0 if it finds none. method: "FALS" (fits windows of 5 px) or
+    "LINEMOD"."""
     height, width = depth.shape
     matrix = np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]], np.float32)
     number = getattr(cv2, f"RgbdNormals_RGBD_NORMALS_METHOD_{method}")
@@ -56,14 +58,14 @@ def normals_of(depth: np.ndarray, focal_px: float, method: str) -> np.ndarray:
 
 
 def normals_angle(depth: np.ndarray, focal_px: float, method: str, cuts: Sequence[float]) -> np.ndarray:
-    """Degrees between the normals 2 px on either side of a pixel, the larger of both directions."""
+    """Returns degrees between the normals 2 px on either side of a pixel, the larger of both directions."""
     normals, angle = normals_of(depth, focal_px, method), np.zeros(depth.shape)
     for axis in (0, 1):
         before, after = np.roll(normals, 2, axis), np.roll(normals, -2, axis)
         both = (np.abs(before).sum(-1) > 0) & (np.abs(after).sum(-1) > 0)
         cosine = np.clip((before * after).sum(-1), -1, 1)
         angle = np.maximum(angle, np.where(both, np.degrees(np.arccos(cosine)), 0))
-    for border in (angle[:2], angle[-2:], angle[:, :2], angle[:, -2:]):  # what lies beyond is not known
+    for border in (angle[:2], angle[-2:], angle[:, :2], angle[:, -2:]):  # unknown beyond the border
         border[:] = 0
     return np.where(depth > 0, angle, 0)
 
@@ -71,10 +73,10 @@ def normals_angle(depth: np.ndarray, focal_px: float, method: str, cuts: Sequenc
 def surface_variation(
     depth: np.ndarray, focal_px: float, radii_px: tuple[int, ...], cuts: Sequence[float]
 ) -> np.ndarray:
-    """The smallest eigenvalue of the covariance of the points around one, by the sum of all three (Pauly, Keiser and
-    Gross 2003), its root averaged over windows of several radii."""
+    """Returns the smallest eigenvalue of the covariance of the points around a pixel, divided by the sum of all three
+    (Pauly, Keiser and Gross 2003); its root is averaged over windows of several radii."""
     known = (depth > 0).astype(np.float64)
-    # About each pixel's ray, at one depth for all: float64 then keeps the digits of the covariance.
+    # Coordinates are relative to one depth, so that float64 keeps the digits of the covariance.
     points = points_of(depth, focal_px).astype(np.float64)
     points[..., 2] -= float(np.median(depth[depth > 0])) * known if known.any() else 0
     pairs = [(i, j) for i in range(3) for j in range(i, 3)]
@@ -90,7 +92,8 @@ def surface_variation(
 
 
 def _smallest_fraction(xx: np.ndarray, xy: np.ndarray, xz: np.ndarray, yy: np.ndarray, yz: np.ndarray, zz: np.ndarray):
-    """The smallest eigenvalue of symmetric 3 x 3 matrices by their trace, in closed form (Smith 1961)."""
+    """Returns the smallest eigenvalue of symmetric 3 x 3 matrices divided by their trace, in closed form (Smith
+    1961)."""
     trace = np.maximum(xx + yy + zz, 1e-30)
     q = trace / 3
     a, b, c = xx - q, yy - q, zz - q
@@ -102,8 +105,8 @@ def _smallest_fraction(xx: np.ndarray, xy: np.ndarray, xz: np.ndarray, yy: np.nd
 
 @dataclass(frozen=True)
 class Baseline:
-    """strength(depth, focal_px, setting, cuts); settings: those that are tried; cuts: the same, or none where they
-    are quantiles of the strength. needs: a name of cv2 without which it cannot be had."""
+    """strength(depth, focal_px, setting, cuts); settings: tried values; cuts: tried thresholds, or none if they are
+    quantiles of the strength. needs: a name of cv2 that the method requires."""
 
     strength: Callable[[np.ndarray, float, object, Sequence[float]], np.ndarray]
     settings: tuple
@@ -132,7 +135,7 @@ class TunedBaseline:
     cut: float
 
     def run(self, depth: np.ndarray, focal_px: float) -> tuple[np.ndarray, float]:
-        """Distance [H, W] in r, and the milliseconds that it took."""
+        """Returns the distance [H, W] in r, and the run time in milliseconds."""
         start = time.perf_counter()
         strength = self.baseline.strength(depth, focal_px, self.setting, (self.cut,))
         distance = field(strength >= self.cut)
@@ -140,7 +143,7 @@ class TunedBaseline:
 
 
 def field(sharp: np.ndarray) -> np.ndarray:
-    """Distance in pixels to where a mask [H, W] is set, at most EPS_R."""
+    """Returns the distance in pixels to the nearest set pixel of a mask [H, W], at most EPS_R."""
     if not sharp.any():
         return np.full(sharp.shape, EPS_R, np.float32)
     return np.minimum(cv2.distanceTransform((~sharp).astype(np.uint8), cv2.DIST_L2, 5), EPS_R)
@@ -148,7 +151,8 @@ def field(sharp: np.ndarray) -> np.ndarray:
 
 def tuned(baseline: Baseline, seen: Sequence[np.ndarray], focal_px: Sequence[float], truth: Sequence[np.ndarray],
           counts: Sequence[np.ndarray]) -> TunedBaseline:  # fmt: skip
-    """The setting and the cut of the smallest RMSE, mean over frames. truth: distance in r; counts: where it counts."""
+    """Returns the setting and threshold with the smallest RMSE, mean over frames. truth: distance in r; counts:
+    mask."""
     best = (np.inf, baseline.settings[0], 0.0)
     for setting in baseline.settings:
         strengths = [baseline.strength(d, f, setting, baseline.cuts) for d, f in zip(seen, focal_px, strict=True)]

@@ -1,10 +1,10 @@
-"""The edges of a real carton: those found in the fused depth of 42 photos, beside the corners marked by hand.
+"""Compares the edges found on a real box, in the fused depth of 42 photos, with corners marked by hand.
 
     python -m benchmarks.edges.carton            needs `make build` and, once: python -m export.captures fetch box
 
-The carton is that of export/captures, whose depth comes from photos alone (a sweep of planes). Its corners were marked
-in three photos, to a pixel or two, where straight edges would meet: its cardboard is rounded and bulges. The corners in
-space are the least-squares meeting points of their rays; the two that no photo shows complete the box.
+The box is that of export/captures. Its depth comes from photos alone (a plane sweep). The corners were marked in three
+photos, to a pixel or two, at the intersection of straight edges: the cardboard is rounded and bulges. The corners in
+space are the least-squares intersections of their rays; the two corners that no photo shows complete the box.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ CAPTURE = Path(".data/places/real/box")
 PROGRAM = Path("build/release/stage/bin/maquette")
 FETCH = "python -m export.captures fetch box"
 
-# Pixels (x, y). Front: A, B above, C, D below, clockwise from the left; E, F: behind A, B.
+# Pixels (x, y). Front corners: A, B at the top, C, D at the bottom, clockwise from the left. E, F are behind A, B.
 MARKS = {
     "002.jpg": {"A": (302, 98), "B": (563, 172), "C": (538, 236), "D": (303, 162), "E": (373, 12), "F": (593, 67)},
     "014.jpg": {"A": (130, 107), "B": (383, 206), "C": (375, 302), "D": (138, 189), "E": (281, 52), "F": (503, 117)},
     "026.jpg": {"A": (203, 199), "B": (474, 281), "C": (457, 347), "D": (208, 264), "E": (297, 113), "F": (514, 168)},
 }
-EDGES = ("AB", "BC", "CD", "DA", "AE", "BF", "EF", "FG", "CG", "DH", "EH", "GH")  # G, H: behind C, D
+EDGES = ("AB", "BC", "CD", "DA", "AE", "BF", "EF", "FG", "CG", "DH", "EH", "GH")  # behind C, D
 METRICS = ("edges_carton_edges", "edges_carton_px", "edges_carton_angle_deg")
-FOUND_PX = 3.0  # half of a found edge has a curve so near
-STEPS = 200  # places on an edge
-SAME_DEG = 20.0  # a line along an edge differs by less from it
+FOUND_PX = 3.0  # an edge is found if half of it has a curve within this distance
+STEPS = 200  # samples along an edge
+SAME_DEG = 20.0  # largest angle between a line and the edge it belongs to
 
 
 def corners_of(cameras: Mapping[str, Camera], marks: Mapping[str, Mapping[str, tuple[float, float]]]) -> dict:
-    """Corners A to H, float64 [3], in the world of the cameras, which are by the names of `marks`."""
+    """Returns the corners A to H, float64 [3], in the world of the cameras, which are given by the names of `marks`."""
     normal = {name: np.zeros((3, 3)) for corners in marks.values() for name in corners}
     right = {name: np.zeros(3) for name in normal}
     for photo, corners in marks.items():
@@ -64,9 +64,10 @@ def corners_of(cameras: Mapping[str, Camera], marks: Mapping[str, Mapping[str, t
 def compared(
     curves: Sequence[np.ndarray], lines: Sequence[np.ndarray], corners: Mapping[str, np.ndarray], camera: Camera
 ) -> dict:
-    """Curves: polylines [n, 3]; lines: those of two ends. For each edge the part with a curve within FOUND_PX and the
-    median distance of that part, pixels of `camera`; edges found, their median distance, and by how many degrees the
-    angles between found lines at a corner differ from 90 (largest and median; None without any)."""
+    """Compares curves (polylines [n, 3]) and lines (two ends each) with the edges. For each edge: the fraction with a
+    curve within FOUND_PX and the median distance of that fraction, pixels of `camera`. Over all edges: the number
+    found, their median distance, and the deviation from 90 degrees of the angles between found lines at a corner
+    (largest and median; None without any)."""
     places = cKDTree(np.concatenate([_along(curve) for curve in curves] or [np.zeros((0, 3))]))
     rows, ways = [], {}
     for name in EDGES:
@@ -93,13 +94,14 @@ def compared(
 
 
 def _along(curve: np.ndarray) -> np.ndarray:
-    """Places on a polyline, close enough that the nearest one tells its distance: [m, 3]."""
+    """Returns points on a polyline, dense enough that the nearest one gives the distance: [m, 3]."""
     t = (np.arange(STEPS) / (STEPS - 1))[:, None]
     return np.concatenate([a + (b - a) * t for a, b in pairwise(curve)])
 
 
 def _line_along(lines: Sequence[np.ndarray], a: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-    """Direction of the longest line along the edge from a to b: its middle is within a tenth of its length of it."""
+    """Returns the direction of the longest line along the edge from a to b; its middle is within a tenth of its length
+    of the edge."""
     edge, length = (b - a) / np.linalg.norm(b - a), np.linalg.norm(b - a)
     best, size = None, 0.0
     for line in lines:
@@ -113,8 +115,8 @@ def _line_along(lines: Sequence[np.ndarray], a: np.ndarray, b: np.ndarray) -> np
 
 
 def measure(capture: Path = CAPTURE, bundle: Path | None = None) -> dict:
-    """`compared` of the fused curves. Raises FileNotFoundError without the capture or its depth, CalledProcessError
-    where the program fails."""
+    """Returns `compared` of the fused curves. Raises FileNotFoundError without the capture or its depth,
+    CalledProcessError if the program fails."""
     if not (capture / "depth").is_dir():
         raise FileNotFoundError(f"{capture} has no depth: {FETCH}")
     place = read_capture(capture)
@@ -132,7 +134,7 @@ def measure(capture: Path = CAPTURE, bundle: Path | None = None) -> dict:
 
 
 def found_in(bundle: Path) -> tuple[dict | None, str]:
-    """What `measure` says of CAPTURE, or None and why it cannot be measured."""
+    """Returns the result of `measure` for CAPTURE, or None and why it cannot be measured."""
     try:
         return measure(CAPTURE, bundle), ""
     except FileNotFoundError as error:
@@ -142,7 +144,7 @@ def found_in(bundle: Path) -> tuple[dict | None, str]:
 
 
 def metrics_from(found: dict | None) -> dict[str, float]:
-    """Those of METRICS that are known."""
+    """Returns the known metrics of METRICS."""
     if found is None:
         return {}
     values = dict(zip(METRICS, (found["found"], found["median_px"], found["angle_deg"]), strict=True))

@@ -1,4 +1,4 @@
-"""How far found curves of a view are from the true ones: by length, and the angle of lines."""
+"""Scores the curves found in a view against the true curves: by length, and the angle of lines."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from benchmarks.edges.edges_api import LINE, Curves
 from benchmarks.edges.views import View, polyline
 from export.edges.curve_metrics import score
 
-MIN_LINE_R = 20.0  # shorter lines have no angle to speak of
-SAME_LINE_R = 3.0  # from a found line's middle to the true line that it is compared with
+MIN_LINE_R = 20.0  # shorter lines have no reliable angle
+SAME_LINE_R = 3.0  # distance from the middle of a found line to the true line that it is compared with
 
 
 def view_score(found: Curves, view: View) -> dict[str, float]:
-    """Scores of export.edges.curve_metrics: what is found may lie on any true curve, but only those have to be found
-    that are surely sharp; with the median angle of lines, degrees."""
+    """Returns scores of export.edges.curve_metrics with the median angle of lines in degrees. A found curve may lie on
+    any true curve, but only certainly sharp ones count as missing."""
     focal_px = view.camera.focal_px
     true = [polyline(c) for c in view.curves["curves"]]
     sure = [polyline(c) for c in view.curves["curves"] if c["sure"]]
@@ -33,7 +33,7 @@ def with_f_score(metrics: dict[str, float]) -> dict[str, float]:
 
 
 def line_angle_deg(found: Curves, true: Sequence[np.ndarray], focal_px: float) -> float:
-    """Median angle between found lines and the true ones that they lie along; NaN without such lines."""
+    """Returns the median angle between found lines and the true lines next to them; NaN without such lines."""
     angles = []
     for points in (p for p, kind in zip(found.points, found.types, strict=True) if kind == LINE):
         middle, along = (points[0] + points[-1]) / 2, points[-1] - points[0]

@@ -1,4 +1,4 @@
-"""Scans of round toys, away from their borders: what the shipped bundle takes for an edge there is none."""
+"""Measures false positives of the shipped bundle on scans of round toys, away from their borders: there is no edge."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from export.solids.records import RecordError, read_records
 
 METRIC = "edges_curved_false_percent"
 SCANS = Path(".data/solids/real")
-NAMES = ("real/rs1_normals", "real/rs22_proc2")  # of export.depth_frames.originals
+NAMES = ("real/rs1_normals", "real/rs22_proc2")  # names in export.depth_frames.originals
 FETCH = f"python -m export.depth_frames fetch --out {SCANS}"
 
 
 def measure(folder: Path, bundle: Path, threads: int) -> dict:
-    """export.depth_frames.sheet.false_positives over both scans, and of each by its name. Raises FileNotFoundError
-    where they are not there."""
+    """Returns export.depth_frames.sheet.false_positives over both scans, and for each by its name. Raises
+    FileNotFoundError without the scans."""
     try:
         frames = {r.name: frame_of(r) for r in read_records(folder) if r.name in NAMES}
     except RecordError as error:
@@ -34,7 +34,7 @@ def measure(folder: Path, bundle: Path, threads: int) -> dict:
 
 
 def found_in(bundle: Path, threads: int) -> tuple[dict | None, str]:
-    """What `measure` says of SCANS, or None and why it cannot be measured."""
+    """Returns the result of `measure` for SCANS, or None and why it cannot be measured."""
     try:
         return measure(SCANS, bundle, threads), ""
     except FileNotFoundError as error:

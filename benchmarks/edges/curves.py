@@ -1,6 +1,6 @@
-"""Curves and boxes that the library finds, beside the true ones: of rendered solids, and of the simulated depth camera.
+"""Compares curves and boxes of the library with the true ones, on rendered solids and the simulated depth camera.
 
-The simulated camera's truth comes from the program print_solids_truth.
+The truth of the simulated camera comes from the program print_solids_truth.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from benchmarks.edges.views import View
 from export.edges.curve_metrics import score
 
 TRUTH = Path("build/release/benchmarks/native/print_solids_truth")
-NOISES = {"none": "clean", "tof": "tof", "stereo": "stereo"}  # of stub:solids, and the level of each
+NOISES = {"none": "clean", "tof": "tof", "stereo": "stereo"}  # noise of stub:solids, and its level
 BOX_SEEDS, BOX_FRAMES, STEADY_FRAMES = 20, 5, 100
 SCENE_FRAMES = 20
 
 
 def mean_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
-    """Means over frames, of each figure those that have it."""
+    """Returns means over frames; frames without a metric are left out of its mean."""
     found = {}
     for name in rows[0]:
         values = [row[name] for row in rows if not np.isnan(row[name])]
@@ -38,7 +38,7 @@ def mean_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
 
 
 def with_curves(views: Sequence[View]) -> list[View]:
-    """Those with a curve that is surely sharp."""
+    """Returns the views with a curve that is certainly sharp."""
     return [view for view in views if any(c["sure"] for c in (view.curves or {"curves": []})["curves"])]
 
 
@@ -57,7 +57,8 @@ def measure_solids(views: Sequence[View], edges: Edges) -> list[dict]:
 
 
 def truth_of(scene: str, seed: int, frames: int) -> dict:
-    """Raises FileNotFoundError without the program, CalledProcessError where it fails."""
+    """Returns the ground truth of a scene. Raises FileNotFoundError without the program, CalledProcessError if it
+    fails."""
     if not TRUTH.exists():
         raise FileNotFoundError(f"{TRUTH} is not there: cmake --build --preset release --target {TRUTH.name}")
     command = [str(TRUTH), scene, str(seed), *map(str, SMALL_PX), str(frames)]
@@ -69,8 +70,8 @@ def frames_of(scene: str, noise: str, seed: int, count: int):
 
 
 def measure_scenes(bundle: Path, threads: int, frames: int) -> list[dict]:
-    """Rows by scene and noise of the simulated camera, planes skipped: milliseconds of the field, curves and boxes, and
-    the score of the curves."""
+    """Returns rows by scene and noise of the simulated camera, with planes skipped: milliseconds of the field, curves
+    and boxes, and the score of the curves."""
     rows = []
     with Edges(bundle, threads, skip_planes=1) as edges:
         for scene in tqdm(SCENES, desc="edges: scenes", unit="scene", disable=None):
@@ -79,7 +80,7 @@ def measure_scenes(bundle: Path, threads: int, frames: int) -> list[dict]:
                 scores, ms = [], {"field": [], "curves": [], "boxes": []}
                 for number, (depth, camera) in enumerate(frames_of(scene, noise, 1, frames + 1)):
                     result = edges.run(depth, camera, curves=True)
-                    if not number:  # prepares the network
+                    if not number:  # the first frame prepares the network
                         continue
                     lines = [np.array(line) for line in truth[number]]
                     metrics = with_f_score(score(result.curves.points, lines, camera.focal_px))
@@ -127,12 +128,12 @@ def _frames_with_box(row: Mapping) -> str:
 
 
 def scene_metrics_from(scenes: Sequence[Mapping]) -> dict[str, float]:
-    """Those that are targets."""
+    """Returns the metrics with a target."""
     return {f"edges_fps_{row['scene']}": 1000 / row["ms"] for row in scenes if row["noise"] == "tof"}
 
 
 def metrics_from(solids: Sequence[Mapping], boxes: Sequence[Mapping]) -> tuple[dict[str, float], dict[str, str]]:
-    """Those that are targets, and why others are missing."""
+    """Returns the metrics with a target, and why others are missing."""
     metrics = {f"edges_curves_{row['level']}": row["f_score"] for row in solids if row["way"] == SHIPPED}
     missing, by_noise = {}, {row["noise"]: row for row in boxes if row["way"] == SHIPPED}
     for noise in ("tof", "stereo"):

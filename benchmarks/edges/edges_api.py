@@ -1,5 +1,4 @@
-"""Edges of depth frames through the Python package (`python/maquette`), for the benchmarks: cameras with square pixels,
-curves as plain lists."""
+"""Runs edges through the Python package (`python/maquette`), with square pixels and curves as plain lists."""
 
 from __future__ import annotations
 
@@ -40,7 +39,7 @@ class Curves:
 @dataclass(frozen=True, eq=False)
 class EdgesResult:
     """Planes [H, W]: distance and spread float32 in r, kind uint8 (0 none, 1 crease, 2 boundary). stats: the fields of
-    maq_edges_stats. curves: if asked for."""
+    maq_edges_stats. curves: None unless requested."""
 
     distance: np.ndarray
     spread: np.ndarray
@@ -64,16 +63,16 @@ class Pinhole:
 
     @staticmethod
     def centred(shape: tuple[int, int], focal_px: float) -> Pinhole:
-        """Of a frame [H, W] whose principal point is its middle."""
+        """Returns the camera of a frame [H, W] whose principal point is its middle."""
         return Pinhole(focal_px, (shape[1] - 1) / 2, (shape[0] - 1) / 2)
 
     def intrinsics(self, shape: tuple[int, int]) -> maquette.Intrinsics:
-        """Of a frame [H, W]."""
+        """Returns the intrinsics for a frame [H, W]."""
         return maquette.Intrinsics(shape[1], shape[0], self.focal_px, self.focal_px, self.cx_px, self.cy_px)
 
 
 class Edges:
-    """One bundle. Use it in a `with` statement.
+    """One bundle, for a `with` statement.
 
     bundle: folder with manifest.json. threads: 0 lets the library choose. settings: further fields of maq_edges_config
     by their names. model: the package's. Raises MaquetteError.
@@ -89,13 +88,13 @@ class Edges:
         self.model.close()
 
     def run(self, depth: np.ndarray, camera: Pinhole, curves: bool = False) -> EdgesResult:
-        """depth: float32 [H, W] in metres, 0 where unknown. curves: find them and boxes too. Raises MaquetteError."""
+        """depth: float32 [H, W] in metres, 0 if unknown. curves: also finds curves and boxes. Raises MaquetteError."""
         return EdgesResult.of(self.model.run(depth, camera.intrinsics(depth.shape), curves))
 
 
 def depth_frames(uri: str, count: int) -> Iterator[tuple[np.ndarray, Pinhole]]:
-    """The first frames of a depth source, such as stub:solids: depth float32 [H, W] in metres, 0 where it is unknown,
-    and the camera. Raises MaquetteError."""
+    """Yields the first frames of a depth source, such as stub:solids: depth float32 [H, W] in metres, 0 if unknown, and
+    the camera. Raises MaquetteError."""
     with maquette.Source(uri) as source:
         intrinsics = source.intrinsics
         camera = Pinhole(intrinsics.fx_px, intrinsics.cx_px, intrinsics.cy_px)

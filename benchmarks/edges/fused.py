@@ -1,7 +1,7 @@
-"""Edges fused over views of solids, beside one view: error, time and memory.
+"""Measures edges fused over views of solids, beside one view: error, time and memory.
 
-Solids are of the split `val`, as in export.edges.compare_fusion, which compares rules of fusion in float64; here it is
-the library that fuses, and its points are judged.
+Solids are of the split `val`, as in export.edges.compare_fusion, which compares fusion rules in float64. Here the
+library fuses, and its points are compared with the truth.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ METRICS, TIME_METRIC = ("edges_fusion_memory_mb", "edges_fusion_rmse"), "edges_f
 SOLIDS, QUICK_SOLIDS = 6, 2
 VIEWS, TIMED_VIEWS = 12, 24
 TIMED_LEVEL = "tof"
-LARGE_PX, MANY = (640, 480), 1_000_000  # views for the measurement of memory, and points
-ALONE_EVERY = 3  # of the views, whose curves are judged without fusion
-FAR = 1e7  # r: from where a solid, of some thousand, has one footprint
-NEAR_CELLS = 2.0  # from a pixel's place to the point that it became part of, at most
+LARGE_PX, MANY = (640, 480), 1_000_000  # size of the views and number of points for the measurement of memory
+ALONE_EVERY = 3  # step between views whose curves are scored without fusion
+FAR = 1e7  # in r: at this distance a solid of some thousand r has one footprint
+NEAR_CELLS = 2.0  # largest distance from a pixel's point to the fused point it belongs to
 INSTALL = "scripts/make-venv.sh dev,solids"
 
 
 def distances_at(pixels: JudgedPixels, points: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Fused distances [N] in r of the pixels, those of the nearest of POINT, and how far these say distances [N]: as
-    far as the view that was nearest to a point, which may be less than EPS_R of this one's. NaN where no point is near:
-    it has been left out."""
+    """Returns fused distances [N] in r of the pixels, from the nearest of POINT, and the limits [N] up to which they
+    hold. The limit is that of the view nearest to the point, which may be less than EPS_R of this view. NaN without a
+    near point: it has been left out."""
     if not len(points):
         return np.full((2, len(pixels.own)), np.nan)
     metres, nearest = cKDTree(points["point_m"]).query(pixels.targets.point)
@@ -57,9 +57,9 @@ def distances_at(pixels: JudgedPixels, points: np.ndarray, cell_m: float) -> tup
 def errors_of(
     solid: MultiView, depths: Sequence[np.ndarray], results: Sequence[EdgesResult], points: np.ndarray, cell_m: float
 ) -> list[dict[str, float]]:
-    """By view: RMSE in r of the view alone and of the fused points, against the nearest sharp curve that any view sees:
-    over the pixels that have a point, all distances cut where the point's end. known: of the pixels that count, the
-    fraction that have one."""
+    """Returns for each view the RMSE in r of the view alone and of the fused points, against the nearest sharp curve of
+    any view. Only pixels with a point count; all distances are clipped at the point's limit. known: fraction of counted
+    pixels with a point."""
     rows = []
     for posed, depth, result in zip(solid.views, depths, results, strict=True):
         view = FieldView(posed.camera, *(p.astype(np.float64) for p in (depth, result.distance, result.spread)))
@@ -75,8 +75,8 @@ def errors_of(
 
 @dataclass
 class FusedViews:
-    """depths: what the sensor of a level reports of each view; results: what is found in that. points, curves, in the
-    world, and info: of the fusion. seconds: of it, `s` wall-clock, `cpu_s` of all threads."""
+    """depths: the sensor's report of each view at a level; results: edges of each. points, curves (both in the world)
+    and info: of the fusion. seconds: time of the fusion, `s` wall-clock, `cpu_s` of all threads."""
 
     depths: list[np.ndarray]
     results: list[EdgesResult]
@@ -88,7 +88,7 @@ class FusedViews:
 
 def fused_views(solid: MultiView, level: str, seed: int, edges: Edges, threads: int) -> FusedViews:
     depths, results = [], []
-    rng = np.random.default_rng([24, seed, len(level)])  # as in export.edges.compare_fusion
+    rng = np.random.default_rng([24, seed, len(level)])  # the same seeds as export.edges.compare_fusion
     with Fusion(edges, threads=max(threads, 0)) as fusion:
         for view in solid.views:
             depths.append(seen_by(sensors.LEVELS[level], view.depth, view.camera.fx_px, rng))
@@ -99,8 +99,8 @@ def fused_views(solid: MultiView, level: str, seed: int, edges: Edges, threads: 
 
 
 def curve_rows(solid: MultiView, fused: FusedViews, edges: Edges) -> list[dict[str, float]]:
-    """Precision, recall and F-score by length within WITHIN_R of the median pixel, against all curves that any view
-    sees: the first of the fused views, the others of single ones, every ALONE_EVERY-th."""
+    """Returns precision, recall and F-score by length within WITHIN_R of the median pixel, against all curves that any
+    view sees: first for the fused views, then for every ALONE_EVERY-th single view."""
     r_m = float(np.median([np.median(v.depth[v.depth > 0]) / v.camera.fx_px for v in solid.views if v.depth.any()]))
     rows = [world_score(fused.curves, solid.curves, r_m)]
     for view, depth in list(zip(solid.views, fused.depths, strict=True))[::ALONE_EVERY]:
@@ -112,16 +112,17 @@ def curve_rows(solid: MultiView, fused: FusedViews, edges: Edges) -> list[dict[s
 
 
 def world_score(found: Sequence[np.ndarray], true: Sequence[np.ndarray], r_m: float) -> dict[str, float]:
-    """export.edges.curve_metrics.score of polylines [n, 3] in the world, where r is the same everywhere."""
-    # Put so far away from a camera with as long a focal length that depth, and so r, hardly varies.
+    """Returns export.edges.curve_metrics.score for polylines [n, 3] in the world, with a constant r."""
+    # The lines are moved far away from a camera with as large a focal length, so that depth, and with it r, is
+    # constant.
     away = np.array([0, 0, FAR])
     metrics = score([line / r_m + away for line in found], [line / r_m + away for line in true], FAR)
     return {key: metrics[key] for key in ("precision", "recall", "f_score")}
 
 
 def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[tuple[int, MultiView]]:
-    """Seeds of `val` with their solids in so many views; those that cannot be made are appended to `missing`. Raises
-    ImportError without OpenCascade and Embree."""
+    """Yields seeds of `val` with their solids in `views` views; appends failures to `missing`. Raises ImportError
+    without OpenCascade and Embree."""
     from export.solids.multiview import multiview
     from export.solids.recipe import RecipeError
 
@@ -133,9 +134,9 @@ def solids(views: int, quick: bool, missing: list[str], said: str) -> Iterator[t
 
 
 def measure(bundle: Path, threads: int, quick: bool, folder: Path) -> dict:
-    """errors: by level, means over views of all solids. curves: by level, means over solids, of all views fused and of
-    single ones. memory: of the first solid that there is, in LARGE_PX. Raises
-    ImportError as `solids`, CalledProcessError where the child process fails."""
+    """Returns errors by level, means over views of all solids; curves by level, means over solids, fused and single;
+    memory of the first solid, in LARGE_PX. Raises ImportError as `solids`, CalledProcessError if the child process
+    fails."""
     from export.solids.multiview import multiview
 
     rows: dict[str, list[dict]] = {level: [] for level in LEVELS}
@@ -161,7 +162,8 @@ def means_of(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def measure_times(bundle: Path, threads: int, quick: bool) -> dict:
-    """times: of each solid in TIMED_VIEWS, the views' own networks left out. Raises ImportError as `solids`."""
+    """Returns the times of each solid in TIMED_VIEWS, without the networks of the views. Raises ImportError as
+    `solids`."""
     times, missing = [], []
     with Edges(bundle, threads) as edges:
         for seed, solid in solids(TIMED_VIEWS, quick, missing, "edges: time of fusion"):
@@ -172,14 +174,14 @@ def measure_times(bundle: Path, threads: int, quick: bool) -> dict:
 
 
 def memory_of(solid: MultiView, bundle: Path, threads: int, folder: Path) -> dict:
-    """Of cells so wide that there are about MANY points."""
+    """Measures memory with cells so wide that there are about MANY points."""
     depths, cameras = [view.depth for view in solid.views], [view.camera for view in solid.views]
     usual = in_child(depths, cameras, bundle, threads, folder)
     return in_child(depths, cameras, bundle, threads, folder, usual["cell_m"] * (usual["points"] / MANY) ** 0.5)
 
 
 def summed(rows: Mapping[str, Sequence[Mapping[str, float]]]) -> list[dict]:
-    """Means by level, and the one of fused views by that of one."""
+    """Returns means by level, and the ratio of fused views to one view."""
     found = []
     for level, of_level in rows.items():
         if of_level:
@@ -189,7 +191,7 @@ def summed(rows: Mapping[str, Sequence[Mapping[str, float]]]) -> list[dict]:
 
 
 def found_by(measuring: Callable[[], dict]) -> tuple[dict | None, str]:
-    """What `measure` or `measure_times` says, or None and why it cannot be measured."""
+    """Returns the result of `measure` or `measure_times`, or None and why it cannot be measured."""
     try:
         return measuring(), ""
     except ImportError as error:
@@ -199,8 +201,8 @@ def found_by(measuring: Callable[[], dict]) -> tuple[dict | None, str]:
 
 
 def metrics_from(found: Mapping | None) -> dict[str, float]:
-    """Those of METRICS and TIME_METRIC that `found` says: the seconds of the median solid, megabytes of MANY points in
-    proportion to those that there were, and the ratio of the level that gains the least."""
+    """Returns the metrics of METRICS and TIME_METRIC in `found`: seconds of the median solid, megabytes scaled to MANY
+    points, and the ratio of the level with the smallest gain."""
     if found is None:
         return {}
     metrics = {}

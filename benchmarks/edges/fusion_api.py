@@ -1,4 +1,4 @@
-"""Fusion of edges over views through the Python package, with the time that it takes without the network."""
+"""Fuses edges over views through the Python package, and times it without the network."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from export.camera import Camera
 
 
 class Fusion:
-    """Views of one thing, found by `edges`. Use it in a `with` statement.
+    """Views of one object, whose edges come from `edges`; for a `with` statement.
 
     settings: fields of maq_edges_fusion_config by their names. seconds: what add_view, finish and curves of the
     library have taken, wall-clock, without the network; cpu_seconds: of all threads of the process in that time. Raises
@@ -33,7 +33,7 @@ class Fusion:
         self._fusion.close()
 
     def add_view(self, depth: np.ndarray, camera: Camera) -> EdgesResult:
-        """Runs the network on depth, float32 [H, W] in metres, and adds the view; its result."""
+        """Runs the network on depth, float32 [H, W] in metres, adds the view and returns its result."""
         size = camera.width_px, camera.height_px
         lens = maquette.Intrinsics(*size, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px)
         result = self._edges.run_native(depth, lens)
@@ -42,17 +42,17 @@ class Fusion:
         return EdgesResult.of(self._edges.copied(result))
 
     def finish(self) -> Curves:
-        """Makes points and curves of the views; the curves, in the world."""
+        """Fuses the views into points and curves; returns the curves in the world."""
         self._timed(self._fusion.finish)
         return Curves.of(self._timed(self._fusion.curves))
 
     @property
     def info(self) -> Any:
-        """The fields of maq_edges_fusion_info."""
+        """Returns the fields of maq_edges_fusion_info."""
         return SimpleNamespace(**self._fusion.info)
 
     def points(self) -> np.ndarray:
-        """maquette.fusion.POINT [N] of the latest `finish`."""
+        """Returns maquette.fusion.POINT [N] of the latest `finish`."""
         return self._fusion.points()
 
     def _timed(self, call: Callable[[], Any]) -> Any:

@@ -1,11 +1,10 @@
-"""What fusing adds to the memory of a process, in a process of its own, for benchmarks/edges/fused.py:
+"""Measures the memory that fusion adds to a process, in a process of its own, for benchmarks/edges/fused.py:
 
     python -m benchmarks.edges.fusion_memory VIEWS.npz BUNDLE THREADS CELL_M
 
-prints {"points": 1000000, "cell_m": 0.002, "memory_mb": 110.0}: the peak above what the process held before the fusion,
-when its network had run once. What an app copies points into is not in it. VIEWS.npz: depth [V, H, W] in metres,
-intrinsics [V, 4] (fx, fy, cx, cy in pixels), rotation [V, 3, 3] and centre [V, 3] of its cameras. CELL_M: 0 is the
-library's choice.
+prints {"points": 1000000, "cell_m": 0.002, "memory_mb": 110.0}: the peak above the peak after the network ran once.
+Copies of the points are not included. VIEWS.npz: depth [V, H, W] in metres, intrinsics [V, 4] (fx, fy, cx, cy in
+pixels), rotation [V, 3, 3] and centre [V, 3] of its cameras. CELL_M: 0 is the library's choice.
 """
 
 from __future__ import annotations
@@ -31,7 +30,8 @@ def in_child(
     folder: Path,
     cell_m: float = 0,
 ) -> dict:
-    """What the program prints of these views, which it gets through a file in `folder`. Raises CalledProcessError."""
+    """Runs the program on these views, which it reads from a file in `folder`; returns its JSON. Raises
+    CalledProcessError."""
     file = folder / "edges-fusion-views.npz"
     intrinsics = [(c.fx_px, c.fy_px, c.cx_px, c.cy_px) for c in cameras]
     np.savez(file, depth=np.stack(depths), intrinsics=intrinsics, rotation=[c.rotation for c in cameras],
@@ -63,7 +63,7 @@ def measured(file: Path, bundle: Path, threads: int, cell_m: float) -> dict:
 
 
 def _status_mb(name: str) -> float:
-    """Of this process alone: getrusage() begins with the peak of the one that started it."""
+    """Returns the peak of this process alone; getrusage() begins with the peak of the parent process."""
     text = Path("/proc/self/status").read_text()
     return next(float(line.split()[1]) for line in text.splitlines() if line.startswith(f"{name}:")) * 1024e-6
 

@@ -1,12 +1,12 @@
-"""Edges: how far fields and curves of depth frames are from the true ones, against run time, beside other ways.
+"""Measures edges: error of fields and curves of depth frames against run time, beside baselines.
 
     python -m benchmarks --only edges                        `make build` first
-    python -m benchmarks --only edges --quick                a few views, to see that it runs
-    python -m benchmarks --only edges --edge-parts fields curves    an hour, which a busy machine does not distort
-    python -m benchmarks --only edges --edge-parts times            minutes, for a quiet one
+    python -m benchmarks --only edges --quick                a few views, a smoke test
+    python -m benchmarks --only edges --edge-parts fields curves    an hour; other load does not matter
+    python -m benchmarks --only edges --edge-parts times            minutes, on an idle machine
 
-Metrics come from whole views of solids whose families neither training nor the choice of thresholds saw. A target that
-could not be measured is said to be so, with the reason.
+Errors are measured on whole views of solids whose families neither training nor the choice of thresholds saw. The
+report names each target that could not be measured, with the reason.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ from export.solids.sensors import LEVELS
 
 SOLIDS, BUNDLE, WEIGHTS = Path(".data/solids"), Path("sdk/models/edges-int8"), Path("export/weights/edges.pt")
 SOLIDS_OF = {"val": 40, "test": 200}
-WIDTH_PX = 320  # of the views that errors are measured on
+WIDTH_PX = 320  # width of the views for errors
 MIN_VIEWS = 200
 SPEED_VIEWS, SAVING_FRAMES = 24, 40
-CURVE_VIEWS = 100  # of the test views, evenly
+CURVE_VIEWS = 100  # number of test views, spread evenly
 QUICK_VIEWS, QUICK_FRAMES = 8, 4
-CAD_PARTS = "kicad"  # the set of real parts, whose errors are compared with those of own solids
+CAD_PARTS = "kicad"  # the set of real CAD parts, compared with synthetic solids
 
 PARTS = ("fields", "curves", "times")
 FIELD_METRICS = (
@@ -69,9 +69,9 @@ METRICS = tuple(figure for metrics in METRICS_OF.values() for figure in metrics)
 
 @dataclass(frozen=True)
 class Sources:
-    """solids: folder with `val` and `test`. bundle: the shipped one; weights: its own, in float. others: further
-    weights by name. bundles: further bundles by name. sets: further folders of whole views, by name. views: of each,
-    at most."""
+    """solids: folder with `val` and `test`. bundle: the shipped one; weights: the same network in float. others:
+    further weights by name. bundles: further bundles by name. sets: further folders of whole views by name. views:
+    maximum number of views of each set."""
 
     solids: Path
     bundle: Path
@@ -84,7 +84,8 @@ class Sources:
 
 @dataclass
 class Found:
-    """Of one of PARTS: its entries of the document, the metrics that are targets, and why others are missing."""
+    """The result of one of PARTS: its entries of the document, its metrics with a target, and why others are
+    missing."""
 
     document: dict
     metrics: dict[str, float]
@@ -92,7 +93,7 @@ class Found:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where views and networks are."""
+    """Adds arguments for views and networks."""
     named = {"nargs": "+", "default": [], "type": _named}
     parser.add_argument("--solids", type=Path, default=SOLIDS, metavar="DIR",
                         help=f"rendered solids with val and test, made if not there; default: {SOLIDS}")  # fmt: skip
@@ -116,7 +117,7 @@ def _named(text: str) -> tuple[str, Path]:
 
 
 def sources_of(options: argparse.Namespace) -> Sources:
-    """What the arguments say. Renders solids where there are none."""
+    """Reads the arguments. Renders solids if there are none."""
     for split, count in SOLIDS_OF.items():
         if not list((options.solids / split).glob("solids-*.npz")):
             count = 10 if options.quick else count
@@ -131,7 +132,7 @@ def sources_of(options: argparse.Namespace) -> Sources:
 
 
 def networks_of(given: Sources, folder: Path) -> Networks:
-    """Bundles of all networks; those of weights are exported into `folder`."""
+    """Returns bundles of all networks; weights are exported into `folder`."""
     bundles, histograms, missing = {SHIPPED: given.bundle}, {}, {}
     for name, path in {FLOAT: given.weights, **given.others}.items():
         if not path.exists():
@@ -152,9 +153,8 @@ def networks_of(given: Sources, folder: Path) -> Networks:
 def measure(
     given: Sources, folder: Path, threads: int, quick: bool, parts: Sequence[str] = PARTS, last: Mapping | None = None
 ) -> tuple[dict, dict[str, float], dict[str, str]]:
-    """What was measured, the metrics that are targets, and why others are missing. last: the document of a run before,
-    from which parts come that are not measured. The sheet of images is written into `folder`: images are in no
-    JSON."""
+    """Returns the document, the metrics with a target, and why others are missing. last: document of an earlier run,
+    from which the other parts come. Writes the contact sheet into `folder`, because JSON holds no images."""
     document, networks = dict(last or {}), networks_of(given, folder)
     document.setdefault("warnings_of", {})
     metrics, missing = {}, {}
@@ -178,7 +178,7 @@ def measure(
 
 
 def views_of(given: Sources, quick: bool) -> tuple[list[View], list[View]]:
-    """Of validation and of test, WIDTH_PX wide."""
+    """Returns validation and test views, WIDTH_PX wide."""
     views = view_limit(given, quick)
     val, test = (read_views(given.solids / split, WIDTH_PX, views) for split in ("val", "test"))
     return val, test
@@ -189,7 +189,7 @@ def view_limit(given: Sources, quick: bool) -> int | None:
 
 
 def measure_fields(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
-    """Errors of fields, and memory: what a busy machine does not distort."""
+    """Measures errors of fields, and memory; other load does not matter."""
     val, test = views_of(given, quick)
     levels = [level for level in LEVELS if level not in quality.LEVELS]
     with ExitStack() as stack:
@@ -217,7 +217,7 @@ def measure_fields(given: Sources, networks: Networks, folder: Path, threads: in
 
 
 def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quick: bool) -> Found:
-    """Errors of curves and boxes, of one view and of fused ones: what a busy machine does not distort."""
+    """Measures errors of curves and boxes, of one view and of fused views; other load does not matter."""
     _, test = views_of(given, quick)
     amounts = (2, 2, 5) if quick else (curves.BOX_SEEDS, curves.BOX_FRAMES, curves.STEADY_FRAMES)
     some = test[:: max(1, len(test) // CURVE_VIEWS)]
@@ -239,11 +239,11 @@ def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quic
 
 
 def measure_times(given: Sources, networks: Networks, folder: Path, threads: int, quick: bool) -> Found:
-    """Error against run time, savings, frames a second, seconds of a fusion. Needs a quiet machine."""
+    """Measures error against run time, savings, frames a second, and seconds of a fusion. Needs an idle machine."""
     count = 2 if quick else min(SPEED_VIEWS, given.views or SPEED_VIEWS)
     val, test = (read_views(given.solids / split, speed.FULL_PX[0], count) for split in ("val", "test"))
     scene_frames = QUICK_FRAMES if quick else curves.SCENE_FRAMES
-    # What targets are about comes first, while the machine is quiet.
+    # Metrics with a target come first.
     of_scenes = curves.measure_scenes(given.bundle, threads, scene_frames)
     saving_frames = QUICK_FRAMES if quick else SAVING_FRAMES
     savings = speed.measure_savings(given.bundle, threads, saving_frames)
@@ -259,7 +259,7 @@ def cuts_of(cuts: dict[str, dict[float, int]]) -> dict[str, dict[float, int]]:
 
 
 def baselines_of(val: Sequence[View]) -> dict[str, dict]:
-    """Tuned on views of the size that times are measured at."""
+    """Returns baselines tuned on views of the size for times."""
     return {level: tuned_baselines(val, [view.seen(level) for view in val])[0] for level in quality.LEVELS}
 
 
@@ -268,7 +268,7 @@ def solid_of(view: View) -> str:
 
 
 def set_ratio(rows: Sequence[dict], own: Sequence[dict]) -> float:
-    """The largest RMSE on a set by that on own solids, over levels."""
+    """Returns the largest ratio over levels of the RMSE on a set to that on synthetic solids."""
     ours = {row["level"]: row["rmse_r"] for row in own if row["way"] == SHIPPED}
     return max(row["rmse_r"] / ours[row["level"]] for row in rows if row["rmse_r"] is not None)
 

@@ -24,12 +24,12 @@ SHIPPED, FLOAT, NOTHING = "int8, as shipped", "fp32, the same weights", "no edge
 
 class Method(Protocol):
     def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
-        """Distance [H, W] in r, and the milliseconds that it took."""
+        """Returns the distance [H, W] in r, and the run time in milliseconds."""
 
 
 @dataclass
 class LibraryField:
-    """A bundle in the shipped C library. last: of the latest frame."""
+    """A bundle in the shipped C library. last: result of the latest frame."""
 
     edges: Edges
     last: EdgesResult | None = None
@@ -41,7 +41,7 @@ class LibraryField:
 
 @dataclass(frozen=True)
 class TorchField:
-    """A network that no bundle can hold: of the histogram loss."""
+    """A network with the histogram loss, which a bundle cannot hold."""
 
     field: object
 
@@ -53,7 +53,7 @@ class TorchField:
 
 @dataclass(frozen=True)
 class NoEdges:
-    """The field of a frame without edges: what any way must beat."""
+    """The field of a frame without edges, which each method must beat."""
 
     def run(self, depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, float]:
         return np.full(depth.shape, EPS_R, np.float32), 0.0
@@ -69,7 +69,7 @@ class BaselineField:
 
 @dataclass(frozen=True)
 class Networks:
-    """bundles: folders by the name of the way, SHIPPED first. histograms: weights of the histogram loss by name.
+    """bundles: folders by the name of the method, SHIPPED first. histograms: weights of the histogram loss by name.
     missing: why others are not measured, by name."""
 
     bundles: Mapping[str, Path]
@@ -78,7 +78,7 @@ class Networks:
 
 
 def opened(networks: Networks, threads: int, stack: ExitStack) -> dict[str, Method]:
-    """Every network, until the stack closes them."""
+    """Opens every network until the stack closes."""
     found: dict[str, Method] = {}
     for name, path in networks.bundles.items():
         found[name] = LibraryField(stack.enter_context(Edges(path, threads)))
@@ -90,7 +90,8 @@ def opened(networks: Networks, threads: int, stack: ExitStack) -> dict[str, Meth
 
 
 def tuned_baselines(views: Sequence[View], seen: Sequence[np.ndarray]) -> tuple[dict[str, Method], dict[str, str]]:
-    """Baselines with what suits these views best, and why others are missing. seen: what the sensor reports of each."""
+    """Returns baselines with the best settings on these views, and why others are missing. seen: the sensor's report of
+    each view."""
     found, missing = {}, {}
     counts = [view.frame.counts & (depth > 0) for view, depth in zip(views, seen, strict=True)]
     for name, baseline in baselines.BASELINES.items():

@@ -1,4 +1,4 @@
-"""Images of the report about edges: error against time, error against noise, and a sheet of fields to look at."""
+"""Draws the images of the section on edges: error against time, error against noise, and a contact sheet of fields."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHEET = "edges-sheet.jpg"
 
 
 def write(measured: dict, folder: Path) -> list[Path]:
-    """The images of what was measured, into `folder`; the sheet has been written."""
+    """Writes the images of the measured values into `folder`; the contact sheet exists already."""
     drawn: dict[str, Callable[[dict], plt.Figure]] = {}
     if "speed" in measured:
         drawn["edges-error-against-run-time.png"] = error_against_time
@@ -38,7 +38,7 @@ def write(measured: dict, folder: Path) -> list[Path]:
 
 
 def front_of(rows: list[dict]) -> list[dict]:
-    """What no other beats in both time and error, by rising time."""
+    """Returns the Pareto front of time and error, by increasing time."""
     return [rows[k] for k in pareto([(row["ms"], row["rmse_r"]) for row in rows])]
 
 
@@ -69,7 +69,7 @@ def error_against_time(measured: dict) -> plt.Figure:
 
 
 def groups(measured: dict) -> plt.Figure:
-    """Recall within 4 r, or where there is no edge false positives, by what is particular about pixels."""
+    """Plots recall within 4 r, or false positives for groups without an edge, by group of pixels."""
     rows = measured["groups"]
     axes_of = list(dict.fromkeys(row["axis"] for row in rows))
     levels = list(dict.fromkeys(row["level"] for row in rows))
@@ -97,7 +97,7 @@ def groups(measured: dict) -> plt.Figure:
 
 
 def write_sheet(shown: list[dict], folder: Path) -> Path:
-    """A row a view and sensor: what is read of it, the true field, and what each way makes of it, with its RMSE."""
+    """Writes a row for each view and sensor: input, true field, and the field of each method with its RMSE."""
     ways = ["what the network reads", "true field", SHIPPED, *BASELINES]
     figure, axes = plt.subplots(len(shown), len(ways), figsize=(2.6 * len(ways), 2.1 * len(shown)), squeeze=False,
                                 layout="constrained")  # fmt: skip

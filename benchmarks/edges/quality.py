@@ -17,19 +17,19 @@ from benchmarks.edges.views import View
 from export.edges.config import EPS_R, SHARP_R
 from export.edges.metrics import STEPS, cuts, frame_figures, summary
 
-LEVELS = ("clean", "tof", "stereo")  # that have targets and baselines
-TUNING_VIEWS = 40  # of the validation views, evenly; cuts of networks come from all
-SHOWN = 5  # views of the sheet
-MIN_PIXELS = 1000  # of a group: fewer say nothing
-# Baselines say where edges are, with the threshold that suits their RMSE; distances to these are taken as they are.
+LEVELS = ("clean", "tof", "stereo")  # levels with targets and baselines
+TUNING_VIEWS = 40  # number of validation views for tuning, spread evenly; thresholds of networks use all views
+SHOWN = 5  # views in the contact sheet
+MIN_PIXELS = 1000  # smaller groups are not reliable
+# Baselines find edges with the threshold of the smallest RMSE; their distances are used directly.
 OWN_CUTS = {sharp_r: int(sharp_r / EPS_R * STEPS) for sharp_r in SHARP_R}
 
 
 @dataclass
 class Errors:
-    """rows: by level and way. groups: of the shipped network, by what is particular about pixels. agreement: of int8
-    and fp32, by level. shown: for the sheet. cuts: by level, where distances of the shipped network are cut. baselines:
-    the tuned ones, by level. missing: why others are not measured."""
+    """rows: by level and method. groups: of the shipped network, by group of pixels. agreement: of int8 and fp32, by
+    level. shown: for the contact sheet. cuts: thresholds of the shipped network, by level. baselines: tuned ones, by
+    level. missing: why others are not measured."""
 
     rows: list[dict] = field(default_factory=list)
     groups: list[dict] = field(default_factory=list)
@@ -43,7 +43,7 @@ class Errors:
 def measure(
     val: Sequence[View], test: Sequence[View], networks: Mapping[str, Method], other_levels: Sequence[str]
 ) -> Errors:
-    """On `other_levels` only the shipped network is measured."""
+    """Measures all methods on LEVELS, and the shipped network alone on `other_levels`."""
     errors = Errors()
     chosen = set(np.linspace(0, len(test) - 1, min(SHOWN, len(test))).round().astype(int).tolist())
     for level in tqdm([*LEVELS, *other_levels], desc="edges: errors", unit="level", disable=None):
@@ -89,7 +89,7 @@ def measure(
 
 
 def metrics_of(way: Method, view: View, depth: np.ndarray) -> tuple[dict, np.ndarray]:
-    """Metrics of one view with the milliseconds, and the field."""
+    """Returns the metrics of one view with the milliseconds, and the field."""
     distance, ms = way.run(depth, view.camera)
     return of_pixels(distance, view, view.frame.counts & (depth > 0)) | {"ms": ms}, distance
 
@@ -99,7 +99,7 @@ def of_pixels(distance: np.ndarray, view: View, counts: np.ndarray) -> dict:
 
 
 def of_set(test: Sequence[View], way: Method, at: Mapping[str, Mapping[float, int]]) -> list[dict]:
-    """Rows of one way on another set of views. at: by level, where `measure` cut distances."""
+    """Returns rows of one method on another set of views. at: thresholds of `measure`, by level."""
     rows = []
     for level, cut in at.items():
         metrics = [metrics_of(way, view, view.seen(level))[0] for view in test]
@@ -108,12 +108,12 @@ def of_set(test: Sequence[View], way: Method, at: Mapping[str, Mapping[float, in
 
 
 def _or_none(value: float) -> float | None:
-    """JSON has no NaN."""
+    """Replaces NaN, which JSON lacks."""
     return None if np.isnan(value) else value
 
 
 def metrics_from(rows: Sequence[Mapping], agreement: Sequence[Mapping]) -> dict[str, float]:
-    """Those that are targets."""
+    """Returns the metrics with a target."""
     found = {(row["level"], row["way"]): row for row in rows}
     metrics, by_baseline, by_float = {}, [], []
     for level in LEVELS:

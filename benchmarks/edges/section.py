@@ -1,4 +1,4 @@
-"""The part of the report that tells of edges."""
+"""Writes the section "Edges" of the report."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ ANCHORS = [
 
 
 def section(measured: dict) -> tuple[str, list]:
-    """Title and parts, as benchmarks.report has them, of what edges.measure returned: of its errors and its times those
-    that were measured."""
+    """Returns the title and the parts of the section, from a document of edges.measure with any of its parts."""
     parts: list = [f"Warnings of the measurement: {'; '.join(measured['warnings'])}."] if measured["warnings"] else []
     if "errors" in measured:
         parts += error_parts(measured)

@@ -1,4 +1,4 @@
-"""The parts of the report on edges that tell of fused views, of the real carton and of real scans."""
+"""Writes the parts of the section "Edges" on fused views, the real box and real scans."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def carton_parts(found: dict | None) -> list:
 
 
 def fusion_parts(found: dict | None, timed: dict | None) -> list:
-    """Of fused.measure and fused.measure_times, as far as they have run."""
+    """Returns the parts of fused.measure and fused.measure_times, if they have run."""
     return fusion_error_parts(found) + fusion_time_parts(timed)
 
 

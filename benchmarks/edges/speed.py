@@ -1,4 +1,5 @@
-"""Error against run time of fields, and what each saving costs: all settings alternately on the same frames."""
+"""Measures error against run time of fields, and the saving of each option: all settings alternate on the same
+frames."""
 
 from __future__ import annotations
 
@@ -23,8 +24,8 @@ from benchmarks.edges.views import View
 from export.edges.config import EPS_R
 
 FULL_PX = 640, 480
-SIZES = (640, 320, 160)  # widths that frames of FULL_PX are reduced to
-OPTIONS = {"skip planes": {"skip_planes": 1}}  # of maq_edges_config, by what they leave out
+SIZES = (640, 320, 160)  # widths to which frames of FULL_PX are reduced
+OPTIONS = {"skip planes": {"skip_planes": 1}}  # options of maq_edges_config, by the work that they skip
 SCENES = {"wall": "empty wall", "box": "one box", "shelf": "full shelf"}
 NOISES = ("none", "tof", "stereo")
 SMALL_PX = 320, 240
@@ -35,7 +36,7 @@ STREAM, STREAM_FRAMES = "stub:solids?scene=shelf&noise=tof&size=640x480", 40
 
 @dataclass
 class Setting:
-    """axis: which option is varied. bundle: of the networks. width_px: what frames are reduced to. options: of
+    """axis: the varied option. bundle: networks. width_px: width of the reduced frames. options: of
     maq_edges_config."""
 
     name: str
@@ -48,7 +49,7 @@ class Setting:
 
 
 def settings(bundles: Sequence[str]) -> list[Setting]:
-    """What is measured; bundles: names of networks, the shipped one first."""
+    """Returns the measured settings; bundles: names of networks, the shipped one first."""
     made = []
     for name in bundles:
         axis = "shipped" if name == SHIPPED else "networks"
@@ -62,8 +63,8 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
 
 
 def reduced(way: Method, depth: np.ndarray, camera: Pinhole, width_px: int) -> tuple[np.ndarray, float]:
-    """The field of every n-th pixel in both directions, brought back to the frame's size and its r, with the
-    milliseconds of all that."""
+    """Returns the field of every n-th pixel in both directions, scaled to the frame's size and its r, and the total
+    milliseconds."""
     step = depth.shape[1] // width_px
     if step == 1:
         return way.run(depth, camera)
@@ -82,8 +83,8 @@ def reduced(way: Method, depth: np.ndarray, camera: Pinhole, width_px: int) -> t
 def measure(
     views: Sequence[View], bundles: Mapping[str, Path], baselines: Mapping[str, Mapping[str, Method]], threads: int
 ) -> list[dict]:
-    """Rows of every setting and baseline on frames of FULL_PX: median milliseconds, and RMSE in r of the full frame, by
-    level and their mean. baselines: by level."""
+    """Returns rows of every setting and baseline on frames of FULL_PX: median milliseconds, and RMSE in r of the full
+    frame, by level and their mean. baselines: by level."""
     wanted = settings(list(bundles))
     rival_rows = [Setting(name, "without a network", "") for name in next(iter(baselines.values()), {})]
     with ExitStack() as stack:
@@ -129,7 +130,7 @@ def _p90(values: Sequence[float]) -> float:
 
 
 def measure_savings(bundle: Path, threads: int, frames: int) -> list[dict]:
-    """For each scene, noise and option: medians of both times, and how far the field is from that without it."""
+    """Returns for each scene, noise and option the medians of both times, and the difference of the fields."""
     rows = []
     with ExitStack() as stack:
         plain = stack.enter_context(Edges(bundle, threads))
@@ -158,9 +159,9 @@ def measure_savings(bundle: Path, threads: int, frames: int) -> list[dict]:
 
 
 def stream_cost(bundle: Path, threads: int, folder: Path) -> dict[str, float]:
-    """What a stream of 640 x 480 takes: `edges_memory_mb` that it adds to the peak of a process, `edges_allocations` a
-    frame in steady state, of which `edges_own_allocations` are not of ONNX Runtime. Raises FileNotFoundError without
-    the program, CalledProcessError where it fails."""
+    """Returns the cost of a stream of 640 x 480: `edges_memory_mb` added to the peak of a process, `edges_allocations`
+    a frame in steady state, and `edges_own_allocations` without ONNX Runtime. Raises FileNotFoundError without the
+    program, CalledProcessError if it fails."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is not there: cmake --build --preset release --target {PROGRAM.name}")
     library, count = folder / "count_allocations.so", folder / "edges-allocations.json"
@@ -168,7 +169,7 @@ def stream_cost(bundle: Path, threads: int, folder: Path) -> dict[str, float]:
                    check=True)  # fmt: skip
     command = [str(PROGRAM), str(bundle), STREAM, str(STREAM_FRAMES), str(threads)]
     said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    first = STREAM_FRAMES // 2  # a session is made at the first frame, pools fill
+    first = STREAM_FRAMES // 2  # the first frames create a session and fill pools
     environment = {"LD_PRELOAD": str(library), "COUNT_FILE": str(count), "COUNT_FROM": str(first),
                    "COUNT_TO": str(STREAM_FRAMES - 1)}  # fmt: skip
     subprocess.run(command, check=True, capture_output=True, env={**os.environ, **environment})
@@ -180,6 +181,6 @@ def stream_cost(bundle: Path, threads: int, folder: Path) -> dict[str, float]:
 
 
 def metrics_from(rows: Sequence[Mapping]) -> dict[str, float]:
-    """Frames a second of the field, by size."""
+    """Returns frames a second of the field, by size."""
     shipped = {row["width_px"]: row["ms"] for row in rows if row["axis"] == "shipped"}
     return {f"edges_fps_{width}": 1000 / shipped[width] for width in (320, 640)}

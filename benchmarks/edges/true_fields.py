@@ -1,8 +1,5 @@
-"""Curves from the true fields of views: what extraction reaches by itself, which has a target of its own, and what it
-reaches with the depth of sensors, whose error along the ray no field takes away.
-
-The program is that of benchmarks.edges.curve_extraction, which also says why what is missing is missing.
-"""
+"""Measures curves from the true fields of views: the limit of extraction, which has a target of its own, and the result
+with the depth of sensors, whose error along the ray stays."""
 
 from __future__ import annotations
 
@@ -25,8 +22,8 @@ METRIC = "edges_curves_true"
 
 
 def measure(views: Sequence[View], folder: Path) -> list[dict]:
-    """Rows by sensor: means over views with a curve that is surely sharp, as curves.measure_solids; none without any.
-    Raises FileNotFoundError without the program, CalledProcessError where it fails."""
+    """Returns rows by sensor: means over views with a curve that is certainly sharp, as curves.measure_solids; none
+    without such views. Raises FileNotFoundError without the program, CalledProcessError if it fails."""
     if not PROGRAM.exists():
         raise FileNotFoundError(f"{PROGRAM} is not there: cmake --build --preset release --target {PROGRAM.name}")
     wanted, path = with_curves(views), folder / "edges-true-fields"
@@ -45,7 +42,7 @@ def measure(views: Sequence[View], folder: Path) -> list[dict]:
 
 
 def _pack(view: View, depth: np.ndarray, file: BinaryIO) -> None:
-    """The true field as far as depth [H, W] in metres is known."""
+    """Appends the true field where depth [H, W] in metres is known."""
     camera, frame, known = view.camera, view.frame, depth > 0
     intrinsics = camera.focal_px, camera.focal_px, camera.cx_px, camera.cy_px
     distance, kind = np.where(known, frame.distance, EPS_R), np.where(known, frame.kind, 0)
@@ -58,7 +55,7 @@ def _curves(found: Sequence[Mapping]) -> Curves:
 
 
 def found_in(views: Sequence[View], folder: Path) -> tuple[list[dict], str]:
-    """What `measure` says, or nothing and why it cannot be measured."""
+    """Returns the result of `measure`, or nothing and why it cannot be measured."""
     try:
         return measure(views, folder), "the test views have no curves stored"
     except FileNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Sets of whole labelled views (export.solids.dataset --whole), and what is particular about their pixels."""
+"""Reads sets of whole labelled views (export.solids.dataset --whole), and groups their pixels."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from export.edges.validation import frame_through
 from export.solids.records import read_records
 
 ARC_STEP_RAD = np.radians(3.0)
-SAME_CURVE_R = 1.0  # between a pixel's distance to a curve and its label: else the label is another curve's
+SAME_CURVE_R = 1.0  # largest difference of a distance and its label; beyond it, the label is of another curve
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """curves: as export.solids.curves describes them; none where they were not stored."""
+    """curves: as in export.solids.curves; None if they were not stored."""
 
     name: str
     frame: Frame
@@ -34,19 +34,19 @@ class View:
     curves: Mapping | None
 
     def seen(self, level: str) -> np.ndarray:
-        """What the sensor of a level reports: float32 [H, W], metres; the same each time."""
+        """Returns the sensor's report at a level: float32 [H, W] in metres, the same for each call."""
         return frame_through(level, self.frame)
 
     @cached_property
     def groups(self) -> dict[str, dict[str, np.ndarray]]:
-        """By what is varied, then by its range: masks [H, W]."""
+        """Returns masks [H, W] by property, then by its range."""
         frame, camera = self.frame, self.camera
         found = {
             "kind": {"creases": frame.kind == 1, "boundaries": frame.kind == 2},
             "range": bins(frame.depth, (0.5, 1, 2, 4), "m", frame.depth > 0),
             "angle between ray and normal": bins(incidence_deg(frame.depth, camera), (30, 60, 75, 85), "deg"),
         }
-        # A pixel without an edge has no kind: for false positives, both kinds look at all of them.
+        # A pixel without an edge has no kind; false positives of both kinds use all of them.
         far = frame.distance >= SHARP_R[-1]
         found["kind"] = {name: mask | far for name, mask in found["kind"].items()}
         angle, rounding = self._of_nearest_curve()
@@ -63,8 +63,8 @@ class View:
         return found
 
     def _of_nearest_curve(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """For pixels within SHARP_R of an edge, the angle in degrees between its surfaces and its rounding in r; NaN
-        elsewhere. None where the view's curves do not say."""
+        """Returns for pixels within SHARP_R of an edge the angle in degrees between its surfaces and its rounding in r;
+        NaN elsewhere. None if the curves of the view do not have them."""
         curves = [c for c in (self.curves or {}).get("curves", []) if "angle_deg" in c]
         if not curves:
             return None, None
@@ -85,7 +85,7 @@ class View:
 
 
 def read_views(folder: Path, width_px: int | None, limit: int | None) -> list[View]:
-    """Of one width where it is given, at most `limit`, evenly. Raises RecordError where there are none."""
+    """Reads views, of one width if given, at most `limit`, spread evenly. Raises RecordError if there are none."""
     records = [r for r in read_records(folder) if width_px in (None, r.width)]
     if not records:
         raise RecordError(f"{folder} has no views {width_px} px wide. Make some: export.solids.dataset --whole")
@@ -99,7 +99,7 @@ def read_views(folder: Path, width_px: int | None, limit: int | None) -> list[Vi
 
 
 def camera_points(depth: np.ndarray, camera: Pinhole) -> np.ndarray:
-    """[H, W, 3] in metres, camera coordinates."""
+    """Returns points [H, W, 3] in metres, camera coordinates."""
     height, width = depth.shape
     points = points_of(depth, camera.focal_px)
     moved = np.array([(width - 1) / 2 - camera.cx_px, (height - 1) / 2 - camera.cy_px])
@@ -108,7 +108,7 @@ def camera_points(depth: np.ndarray, camera: Pinhole) -> np.ndarray:
 
 
 def polyline(curve: Mapping) -> np.ndarray:
-    """Points [n, 3] of a stored curve; of an arc, which has three, enough of them."""
+    """Returns points [n, 3] of a stored curve; an arc of three points becomes a polyline."""
     points = np.asarray(curve["points"], np.float64)
     if curve["type"] != "arc":
         return points
@@ -117,7 +117,7 @@ def polyline(curve: Mapping) -> np.ndarray:
     y = np.cross(axis, x)
     middle, sweep = (np.arctan2((p - centre) @ y, (p - centre) @ x) % (2 * np.pi) for p in points[1:])
     sweep = sweep if sweep > 1e-9 else 2 * np.pi
-    if middle > sweep:  # the other way round
+    if middle > sweep:  # the opposite direction
         sweep -= 2 * np.pi
     angle = np.linspace(0, sweep, max(3, int(np.ceil(abs(sweep) / ARC_STEP_RAD)) + 1))
     return centre + np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
@@ -126,7 +126,7 @@ def polyline(curve: Mapping) -> np.ndarray:
 def bins(
     values: np.ndarray, edges: Sequence[float], unit: str, among: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """Masks by ranges of values; NaN is in none."""
+    """Returns masks by ranges of values; NaN is in none."""
     among = np.isfinite(values) if among is None else among & np.isfinite(values)
     found = {}
     for low, high in pairwise([-np.inf, *edges, np.inf]):
@@ -140,8 +140,8 @@ def bins(
 
 
 def _slopes_of_inverse(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Inverse depth [H, W] and its differences in x and y a pixel, on either side the one of the smaller size, so that
-    an edge does not tilt what lies beside it; NaN where there is none."""
+    """Returns inverse depth [H, W] and its differences in x and y a pixel. The smaller of the differences to both sides
+    is used, so that an edge does not tilt the surface next to it. NaN for unknown depth."""
     with np.errstate(divide="ignore"):
         inverse = np.where(depth > 0, 1 / depth.astype(np.float64), np.nan)
     slopes = []
@@ -152,7 +152,7 @@ def _slopes_of_inverse(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def normals(depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, np.ndarray]:
-    """Of exact depth [H, W]: unit normals [H, W, 3] and unit rays, camera coordinates; NaN where unknown."""
+    """Returns unit normals [H, W, 3] and unit rays from exact depth [H, W], camera coordinates; NaN if unknown."""
     inverse, sx, sy = _slopes_of_inverse(depth)
     height, width = depth.shape
     x, y = np.meshgrid(np.arange(width) - camera.cx_px, np.arange(height) - camera.cy_px)
@@ -164,14 +164,14 @@ def normals(depth: np.ndarray, camera: Pinhole) -> tuple[np.ndarray, np.ndarray]
 
 
 def incidence_deg(depth: np.ndarray, camera: Pinhole) -> np.ndarray:
-    """Degrees between the ray and the surface's normal, 0 where it is seen head-on; NaN where unknown: [H, W]."""
+    """Returns degrees between the ray and the surface's normal, 0 for a frontal view; NaN if unknown: [H, W]."""
     normal, ray = normals(depth, camera)
     return np.degrees(np.arccos(np.clip(np.abs((normal * ray).sum(-1)), 0, 1)))
 
 
 def bending_radius_r(depth: np.ndarray, focal_px: float) -> np.ndarray:
-    """Radius of the surface in r across the direction in which it bends most, by its normals 2 px to either side of a
-    pixel: infinite on planes, NaN where unknown: [H, W]. Exact depth alone says it."""
+    """Returns the radius of the surface in r along its strongest curvature, from normals 2 px to either side of a
+    pixel: infinite on planes, NaN if unknown: [H, W]. It needs exact depth."""
     camera = Pinhole.centred(depth.shape, focal_px)
     normal, _ = normals(depth, camera)
     points, bend = points_of(depth, focal_px).astype(np.float64), np.zeros(depth.shape)

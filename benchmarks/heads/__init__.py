@@ -1,1 +1,1 @@
-"""Reports of heads: how far heads from photos are from the true ones, beside the mean head."""
+"""Reports of heads: distance of heads from photos to the true heads, beside the mean head."""

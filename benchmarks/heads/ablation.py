@@ -1,7 +1,7 @@
-"""What each setting of a fit costs and gains: time from a photo to a mesh, and the error; one is changed at a time.
+"""Measures the cost and gain of each setting of a fit: time from a photo to a mesh, and the error.
 
-The settings are those of the public API. What the fit leaves out of itself (empty blocks of the mesh, rays that miss,
-samples without colour) has no switch: there is nothing to compare it with but the engine's metrics.
+One setting of the public API is changed at a time. Optimisations without a switch (empty blocks of the mesh, rays that
+miss, samples without colour) cannot be compared here; see `field_kernels.py`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Setting:
 
 
 def settings_of(at_s: float) -> list[Setting]:
-    """The first is what the others are compared with."""
+    """Returns the settings; the others are compared with the first one."""
     return [
         Setting("as reported", at_s),
         Setting("no fit to the pixels", 0.0),
@@ -79,7 +79,7 @@ def _one(builder: HeadBuilder, head: TrueHead, photo: Photo, setting: Setting) -
 
 
 def settings_table(rows: Sequence[Mapping]) -> str:
-    """One line a setting, over the heads that every setting found."""
+    """Returns one line for each setting, over the heads that every setting found."""
     names = list(dict.fromkeys(row["setting"] for row in rows))
     everywhere = set.intersection(*({r["head"] for r in rows if r["setting"] == name} for name in names))
     lines = []

@@ -1,11 +1,12 @@
-"""A sheet of heads to look at: photo, mesh in the photo's pose, its normals, two new views, and the same of the truth.
+"""Draws a contact sheet of heads: photo, mesh in the photo's pose, its normals, two new views, and the same of the
+truth.
 
     python -m benchmarks.heads.quality
     python -m benchmarks.heads.contact_sheet --out build/benchmarks/heads-sheet.jpg
 
-Of each set with one photo the best, the median and the worst head by what `quality.py` measured (whole head, by mean
-head), then real photographs of faces, which have no truth (`export.photos people`, `export.heads.photos.faces test`).
-Needs what heads are made from: `python -m export.people.assets`.
+Each set with one photo shows its best, median and worst head by the distance that `quality.py` measured (whole head,
+ratio to the mean head). Real photographs of faces follow, which have no truth (`export.photos people`,
+`export.heads.photos.faces test`). Needs the assets of synthetic heads: `python -m export.people.assets`.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One row. truth: draws the true head as a camera sees it, and is None where nobody knows it."""
+    """One row. truth: draws the true head from a camera; None if the true head is unknown."""
 
     label: str
     rgb: np.ndarray
@@ -55,7 +56,7 @@ class Case:
 
 
 def chosen(rows: Sequence[Mapping], name: str, at_s: float) -> list[tuple[str, Mapping]]:
-    """The best, the median and the worst head of a set; fewer where there are fewer."""
+    """Returns the best, the median and the worst head of a set; fewer for a smaller set."""
     own = [row for row in rows if row["set"] == name and row["asked_s"] == at_s and "missing" not in row]
     own.sort(key=lambda row: row["head_mm"] / row["mean_head_mm"])
     if len(own) < 3:
@@ -64,7 +65,7 @@ def chosen(rows: Sequence[Mapping], name: str, at_s: float) -> list[tuple[str, M
 
 
 def row_of(builder: HeadBuilder, case: Case, seconds: float) -> list[np.ndarray]:
-    """The tiles of one row, RGB; where the head is not found only the photo and why."""
+    """Returns the tiles of one row, RGB; if the head is not found, only the photo and the reason."""
     empty = np.zeros((TILE_PX, TILE_PX, 3), np.uint8)
     try:
         builder.clear()
@@ -95,7 +96,7 @@ def _labelled(tiles: Sequence[np.ndarray], labels: Sequence[str]) -> list[np.nda
 
 
 def rendered_cases(measured: Mapping, data: Path, backgrounds: PhotoBackgrounds, at_s: float) -> list[Case]:
-    """Best, median and worst of made heads and of those of another maker."""
+    """Returns the best, median and worst synthetic heads and heads of another source."""
     rows = [row for row in measured["rows"] if row["bundle"] == measured["bundles"][0]]
     cases, maker = [], None
     for name, read in ((ONE, read_made_heads), (OTHER, read_other_heads)):
@@ -120,7 +121,7 @@ def rendered_cases(measured: Mapping, data: Path, backgrounds: PhotoBackgrounds,
 
 
 def photo_cases(photos: Path, faces: Path, count: int) -> list[Case]:
-    """Real photographs, with boxes around the faces that `export.heads.photos.faces` found in them."""
+    """Returns real photographs, with boxes around the faces that `export.heads.photos.faces` found."""
     cases = []
     for path in sorted(faces.glob("*.npz"))[:count]:
         picture = next((p for p in photos.glob(f"{path.stem}.*") if p.suffix in (".jpg", ".png")), None)
@@ -137,7 +138,7 @@ def photo_cases(photos: Path, faces: Path, count: int) -> list[Case]:
 
 @dataclass(frozen=True)
 class Sources:
-    """data, backgrounds: as quality.py has them. photos: real photographs, `count` of which are drawn at most."""
+    """data, backgrounds: as in quality.py. photos: real photographs, `count` at most."""
 
     data: Path = DATA
     backgrounds: Path = BACKGROUNDS
@@ -146,8 +147,7 @@ class Sources:
 
 
 def draw(measured: Mapping, bundle: Path, sources: Sources, out: Path, threads: int = 0) -> int:
-    """Draws heads that quality.py measured, and real ones, into an image. Returns how many; where there are none,
-    nothing is written."""
+    """Draws measured and real heads into an image. Returns their number; without any, nothing is written."""
     at_s = measured["at_s"]
     cases = rendered_cases(measured, sources.data, PhotoBackgrounds(sources.backgrounds), at_s)
     cases += photo_cases(sources.photos, sources.data / "photos/test", sources.count)

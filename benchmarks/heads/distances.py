@@ -1,8 +1,8 @@
-"""How far a mesh lies from a true head.
+"""Measures the distance of a mesh from a true head, in mm.
 
-From true points to the nearest points of the mesh's triangles. The true points are first moved, rotated and scaled to
-where they fit the mesh best, those of the face for the face's figure and all for the head's; for other parts of the
-head the alignment is that of the head. `back_mm` goes the other way, from the mesh to the true surface. All in mm.
+Distances go from true points to the nearest points of the mesh's triangles. The true points are first moved, rotated
+and scaled to fit the mesh best: with the points of the face for the face's metric, and with all points for the head's
+metric and for other parts. `back_mm` goes from the mesh to the true surface.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from export.heads.surface import cut_distance
 
 MM_PER_DM = 100
 BACK_POINTS = 4000
-CUT_MARGIN_DM = 0.05  # so near the cut a mesh ends or closes
+CUT_MARGIN_DM = 0.05  # so near the clip plane a mesh ends or closes
 ICP_STEPS, ICP_POINTS = 12, 1000
-# Farther points weigh less: hair that is not there must not pull the face away.
+# Farther points have less weight, so that missing hair does not move the face.
 OUTLIER_MM = 3.0
 
 
@@ -38,7 +38,7 @@ class Triangles:
         return tree
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each of the points [N, 3] the distance [N] to the mesh, and the outward normal [N, 3] there."""
+        """Returns for each of the points [N, 3] the distance [N] to the mesh, and the outward normal [N, 3] there."""
         points = np.ascontiguousarray(points)
         square, face, _ = self._tree.squared_distance(self.points, self.faces, points)
         a, b, c = (self.points[self.faces[face, k]] for k in range(3))
@@ -47,15 +47,15 @@ class Triangles:
         return np.sqrt(square), normal
 
     def offsets(self, points: np.ndarray) -> np.ndarray:
-        """From the nearest points of the mesh to the points, [N, 3]."""
+        """Returns vectors from the nearest points of the mesh to the points, [N, 3]."""
         points = np.ascontiguousarray(points)
         return points - self._tree.squared_distance(self.points, self.faces, points)[2]
 
 
 @dataclass(frozen=True, eq=False)
 class TruePoints:
-    """points: float64 [N, 3] of the surface above the cut, mm; is_face: [N]. None where not known: normals [N, 3];
-    is_inner_face [N], which of them the points of a face network cover (`face_mesh.py`); mesh, the whole surface."""
+    """points: float64 [N, 3] of the surface above the clip plane, mm; is_face: [N]. None if unknown: normals [N, 3];
+    is_inner_face [N], points that a face network covers (`face_mesh.py`); mesh, the whole surface."""
 
     points: np.ndarray
     is_face: np.ndarray
@@ -66,9 +66,9 @@ class TruePoints:
 
 @dataclass(frozen=True)
 class Distances:
-    """Means in mm after alignment; unaligned_mm: of the whole head as it is; scale: the mesh's size by the true one's;
-    None where what is true is not known: normals_deg: mean angle between normals, whole head; inner_face_mm: aligned by
-    the inner face alone; seen_mm, unseen_mm: of what photos show and do not show; back_mm: from the mesh to the true
+    """Means in mm after alignment. unaligned_mm: whole head without alignment; scale: size of the mesh relative to the
+    true one. None if unknown: normals_deg: mean angle between normals, whole head; inner_face_mm: aligned by the inner
+    face alone; seen_mm, unseen_mm: points that the photos show or do not show; back_mm: from the mesh to the true
     surface."""
 
     face_mm: float
@@ -84,7 +84,7 @@ class Distances:
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """x -> scale * rotation @ x + shift."""
+    """Maps x to scale * rotation @ x + shift."""
 
     scale: float
     rotation: np.ndarray
@@ -98,7 +98,7 @@ class Similarity:
 
 
 def aligned(mesh: Triangles, points: np.ndarray, steps: int = ICP_STEPS) -> Similarity:
-    """What moves the points to where they fit the mesh best: point to plane, Huber's loss."""
+    """Returns the similarity that fits the points to the mesh: point to plane, Huber loss."""
     every = max(1, len(points) // ICP_POINTS)
     points = points[::every]
     middle = points.mean(0)
@@ -107,13 +107,13 @@ def aligned(mesh: Triangles, points: np.ndarray, steps: int = ICP_STEPS) -> Simi
         moved = found(points)
         offset = mesh.offsets(moved)
         distance = np.linalg.norm(offset, axis=1)
-        # Where a point lies on the mesh, any direction does.
+        # For a point on the mesh, any direction is valid.
         slope = np.where(distance[:, None] > 1e-9, offset / np.maximum(distance, 1e-9)[:, None], 0)
         centre = found(middle[None])[0]
         arm = moved - centre
         j = np.concatenate([slope, np.cross(arm, slope), (arm * slope).sum(1, keepdims=True)], 1)
         weight = OUTLIER_MM / np.maximum(distance, OUTLIER_MM)
-        scales = np.array([1, 1, 1, 100, 100, 100, 100])  # so that mm and radians count alike in the damping
+        scales = np.array([1, 1, 1, 100, 100, 100, 100])  # scales radians, so that mm and radians are damped equally
         normal = j.T @ (j * weight[:, None]) + np.diag(1e-6 * len(points) * scales**2)
         step = -np.linalg.solve(normal, j.T @ (distance * weight))
         rotation = Rotation.from_rotvec(step[3:6]).as_matrix()
@@ -124,7 +124,7 @@ def aligned(mesh: Triangles, points: np.ndarray, steps: int = ICP_STEPS) -> Simi
 
 
 def measure(mesh: Triangles, true: TruePoints, seen: np.ndarray | None = None) -> Distances:
-    """seen: [N], which of the true points photos show."""
+    """seen: [N], true points that the photos show."""
     whole, face = aligned(mesh, true.points), aligned(mesh, true.points[true.is_face])
     head_mm, normal = mesh.nearest(whole(true.points))
     face_mm, _ = mesh.nearest(face(true.points[true.is_face]))
@@ -141,7 +141,7 @@ def measure(mesh: Triangles, true: TruePoints, seen: np.ndarray | None = None) -
 
 
 def inner_face_mm(mesh: Triangles, true: TruePoints) -> float | None:
-    """Of the inner face alone, aligned by it; None where it is not known."""
+    """Returns the distance of the inner face alone, aligned by it; None if it is unknown."""
     if true.is_inner_face is None:
         return None
     points = true.points[true.is_inner_face]
@@ -149,7 +149,7 @@ def inner_face_mm(mesh: Triangles, true: TruePoints) -> float | None:
 
 
 def back_mm(mesh: Triangles, true: Triangles, to_true: Similarity) -> float | None:
-    """From evenly spread points of the mesh above the cut to the true surface."""
+    """Returns the distance from evenly spread points of the mesh above the clip plane to the true surface."""
     a, b, c = (mesh.points[mesh.faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Images of fitted and true heads from chosen cameras, for looking at (Embree)."""
+"""Draws images of fitted and true heads from chosen cameras (Embree)."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from export.heads.sampling import Lamps, look_at, sample_camera, sample_extras, 
 from export.heads.surface import HeadMaker, Place
 from export.heads.views import HeadViews, Scene, Seen
 
-# Colours of vertices have the photo's light in them; so little more that nothing is cut off at 255.
+# Vertex colours contain the photo's light; more light would saturate them at 255.
 _DIM = 0.75
 FLAT = Lamps(np.full(3, _DIM), np.array([[0.0, -1, 0]]), np.zeros((1, 3)), gloss=0.0)
 STUDIO = Lamps(np.full(3, 0.55), np.array([[-0.4, -0.75, 0.53]]), np.full((1, 3), 0.65), gloss=0.05)
-GREY = 90  # behind heads
-TURN_DEG = 45.0  # of new views, to both sides of the photo's
-FRAME_DM = 3.4  # side of what a new view shows
+GREY = 90  # grey level behind heads
+TURN_DEG = 45.0  # degrees of new views to both sides of the photo's camera
+FRAME_DM = 3.4  # side in dm that a new view shows
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnMesh:
-    """A mesh of the library, seen by cameras in dm."""
+    """A mesh of the library, for cameras in dm."""
 
     scene: Scene
 
     @staticmethod
     def of(mesh: HeadMesh) -> DrawnMesh:
-        """With its texture where it has one, else with the colours of its vertices."""
+        """Returns the mesh with its texture if it has one, otherwise with its vertex colours."""
         faces = mesh.triangles.astype(np.int64)
         textured = mesh.texture_jpeg is not None
         of_vertices = (mesh.texture_coordinates if textured else mesh.colours).astype(np.float64)
@@ -58,7 +58,8 @@ class DrawnMesh:
     def coloured(
         positions: np.ndarray, faces: np.ndarray, normals: np.ndarray, colours: Callable[[Place], np.ndarray]
     ) -> DrawnMesh:
-        """positions, normals: [V, 3] in dm; faces: int64 [F, 3]; colours: RGB 0..255 of places on them."""
+        """positions, normals: [V, 3] in dm; faces: int64 [F, 3]; colours: function that returns RGB 0..255 of surface
+        points."""
 
         def everywhere(points: np.ndarray) -> np.ndarray:
             return np.ones(len(points), bool)
@@ -66,12 +67,12 @@ class DrawnMesh:
         return DrawnMesh(Scene(positions, faces, normals, np.zeros_like(positions), colours, everywhere))
 
     def colours(self, camera: Camera, behind: np.ndarray | None = None) -> np.ndarray:
-        """Without further light, uint8 RGB [H, W, 3]; behind: an image of that size."""
+        """Draws without light, uint8 RGB [H, W, 3]; behind: a background image of that size."""
         rgb, present = self._lit(camera)
         return _before(rgb, present, behind)
 
     def shown(self, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-        """The same before grey, and which pixels show the mesh, bool [H, W]."""
+        """Returns the colours before conversion to grey levels, and the pixels that show the mesh, bool [H, W]."""
         rgb, present = self._lit(camera)
         return _before(rgb, present, None), present
 
@@ -81,14 +82,14 @@ class DrawnMesh:
         return seen.rgb / (_DIM * (1 + 0.25 * up[..., None])), seen.present
 
     def normals(self, camera: Camera) -> np.ndarray:
-        """Of the camera's axes, as colours: red to the right, green up, blue towards the camera."""
+        """Draws normals in the camera's axes as colours: red to the right, green up, blue towards the camera."""
         seen = self.scene.seen(camera, FLAT)
         axes = seen.normal @ camera.rotation.T * [1, -1, -1]
         return _before(127.5 * (axes + 1), seen.present, None)
 
 
 def _towards(camera: Camera, seen: Seen) -> np.ndarray:
-    """Away from the camera, at each pixel, [H, W, 3]; of any length."""
+    """Returns the surface direction away from the camera at each pixel, [H, W, 3]; its length is arbitrary."""
     height, width = seen.depth.shape
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).reshape(-1, 2)
     return (camera.lifted(pixels, np.ones(len(pixels))) - camera.centre).reshape(height, width, 3)
@@ -100,7 +101,7 @@ def _before(rgb: np.ndarray, present: np.ndarray, behind: np.ndarray | None) -> 
 
 
 def beside(camera: Camera, turn_deg: float, side_px: int) -> Camera:
-    """A camera that sees the head from further around it: to the person's left by a positive angle."""
+    """Returns a camera rotated around the head: to the person's left for a positive angle."""
     away = -camera.rotation[2]
     yaw = np.arctan2(away[0], -away[1]) + np.radians(turn_deg)
     distance = 10.0
@@ -108,8 +109,8 @@ def beside(camera: Camera, turn_deg: float, side_px: int) -> Camera:
 
 
 def framed(camera: Camera, box: np.ndarray, sides: float, side_px: int) -> tuple[Camera, np.ndarray]:
-    """A square of `sides` times the box, in `side_px` pixels: its camera, and the affine map [2, 3] from its pixels to
-    those of the camera's image."""
+    """Returns a square of `sides` times the box, in `side_px` pixels: its camera, and the affine map [2, 3] from its
+    pixels to pixels of the camera's image."""
     left, top, right, bottom = box
     side = sides * max(right - left, bottom - top)
     zoom = side / side_px
@@ -126,7 +127,7 @@ def framed(camera: Camera, box: np.ndarray, sides: float, side_px: int) -> tuple
 
 
 def made_head(maker: HeadMaker, name: str, number: int, split: str = "test") -> tuple[HeadViews, Lamps]:
-    """The head of a file of `export.heads.view_shards`, and the light of its image `number`."""
+    """Returns the head of a file of `export.heads.view_shards`, and the light of its image `number`."""
     head = make_head(maker, split, int(name.rpartition("-")[2]))
     rng = np.random.default_rng([zlib.crc32(b"views"), int(name.rpartition("-")[2])])
     views = HeadViews(head, sample_extras(rng))
@@ -139,10 +140,10 @@ def made_head(maker: HeadMaker, name: str, number: int, split: str = "test") -> 
 
 
 def other_head(folder: Path, name: str) -> Scene:
-    """Of another maker: `benchmarks.heads.other_heads` has fetched it into `folder`."""
+    """Returns a head of another source, which `benchmarks.heads.other_heads` has fetched into `folder`."""
     return load_head(folder / "people", name, PEOPLE[name]).scene
 
 
 def seen_before_grey(seen: Seen) -> np.ndarray:
-    """uint8 RGB."""
+    """Returns a renderer of uint8 RGB images."""
     return _before(seen.rgb, seen.present, None)

@@ -1,8 +1,9 @@
-"""MediaPipe's face network (468 points with depth, Apache-2.0) as a baseline: a mesh of the face from one photo.
+"""Builds a baseline from MediaPipe's face network (468 points with depth, Apache-2.0): a mesh of the face from one
+photo.
 
-Its points lie on the template head (`export.heads.photos.face_points`), so that a point of a true head is covered by
-the network's mesh or not, and the mesh comes near the true head before it is aligned. The triangles are Delaunay's of
-the template's points, unrolled around the head's axis: they close eyes and mouth.
+Its points lie on the template head (`export.heads.photos.face_points`). This says which true points the mesh covers,
+and gives its first alignment. The triangles are a Delaunay triangulation of the template's points, unrolled around the
+head's axis; they close eyes and mouth.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from benchmarks.heads.distances import MM_PER_DM, Similarity, Triangles
 from export.heads.photos.face_points import FacePoints, read_face_points
 from export.teachers.faces import Face, FaceDetector, FaceNetwork, Square, faces_of
 
-_AXIS_Y = 0.0  # dm, of the axis that the face is unrolled around
-_REACH_DM = 0.25  # of the nearest point: farther inside lies the throat, farther outside hair
+_AXIS_Y = 0.0  # dm, position of the axis for unrolling
+_REACH_DM = 0.25  # dm to the nearest point; the throat is farther inside, hair farther outside
 
 
 def _unrolled(template: np.ndarray) -> np.ndarray:
-    """Template points [N, 3] (dm) -> angle from the front and height [N, 2], dm."""
+    """Maps template points [N, 3] (dm) to the angle from the front and the height: [N, 2], dm."""
     return np.stack([np.arctan2(template[:, 0], _AXIS_Y - template[:, 1]), template[:, 2]], 1)
 
 
@@ -33,7 +34,7 @@ def _template() -> tuple[FacePoints, Delaunay]:
 
 
 def is_inner_face(template: np.ndarray) -> np.ndarray:
-    """Which of the template points [N, 3] (dm) the network's mesh covers, [N]."""
+    """Returns which of the template points [N, 3] (dm) the network's mesh covers, [N]."""
     points, plane = _template()
     flat = _unrolled(template)
     near = np.zeros(len(template), bool)
@@ -44,7 +45,7 @@ def is_inner_face(template: np.ndarray) -> np.ndarray:
 
 
 def similarity(points: np.ndarray, onto: np.ndarray) -> Similarity:
-    """What moves, rotates and scales points [N, 3] onto others, least squares (Umeyama 1991)."""
+    """Returns the similarity between corresponding points [N, 3], least squares (Umeyama 1991)."""
     a, b = points - points.mean(0), onto - onto.mean(0)
     rotation, _ = Rotation.align_vectors(b, a)
     matrix = rotation.as_matrix()
@@ -53,7 +54,7 @@ def similarity(points: np.ndarray, onto: np.ndarray) -> Similarity:
 
 
 def mesh_of(face: Face) -> Triangles:
-    """Its points about where they lie on the template head, mm."""
+    """Returns its points near their positions on the template head, mm."""
     points, plane = _template()
     seen = np.stack([face.point[:, 0], face.depth, -face.point[:, 1]], 1)
     placed = similarity(seen[points.used], points.template[points.used] * MM_PER_DM)(seen)
@@ -67,7 +68,8 @@ class FaceMeshes:
         self._networks = FaceDetector(), FaceNetwork()
 
     def mesh(self, rgb: np.ndarray, box: np.ndarray) -> Triangles | None:
-        """Of the face in the box of a head in a photo, mm, about in the template's frame; None: it finds none."""
+        """Returns the mesh of the face in a head's box, mm, roughly in the template's frame; None if no face is
+        found."""
         low, high = box[:2], box[2:]
         square = Square((low + high - 1) / 2, float((high - low).max()), 0.0)
         found = faces_of(*self._networks, np.ascontiguousarray(rgb[..., ::-1]), [square])

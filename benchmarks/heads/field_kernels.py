@@ -1,5 +1,5 @@
-"""The engine of the head field beside PyTorch: microseconds a point for the same shapes on one thread, in turn, and the
-fraction of the machine's float peak that it reaches.
+"""Compares the kernels of the head field with PyTorch: microseconds a point for the same shapes on one thread, and the
+reached fraction of the machine's float peak.
 
     cmake --build --preset release --target measure_head_field && python -m benchmarks.heads.field_kernels
 
@@ -23,10 +23,10 @@ from export.heads.prior import FieldShape
 
 PROGRAM = Path("build/release/benchmarks/native/measure_head_field")
 WIDTH = 64
-BATCHES = (256, 6144)  # what stays in the second cache; 512 rays of 12 samples
+BATCHES = (256, 6144)  # fits the second-level cache; 512 rays of 12 samples
 PEAK_SIZES = (192, 256, 384, 512)
-SECONDS, ROUNDS = 0.4, 3  # of each figure and round
-# By the names of measure_head_field.cpp: how often all multiply-adds of the forward pass are done.
+SECONDS, ROUNDS = 0.4, 3  # seconds for each metric and round
+# Names of measure_head_field.cpp, with the number of times that all multiply-adds of the forward pass are done.
 PASSES = {
     "distance": None,
     "forward": 1,
@@ -36,12 +36,12 @@ PASSES = {
 
 
 def macs_of(shape: FieldShape) -> int:
-    """Multiply-adds of a point, forward."""
+    """Returns the multiply-adds of a point, forward."""
     return sum(shape.inputs(layer) * shape.outputs(layer) for layer in range(shape.layers))
 
 
 def torch_works(shape: FieldShape, count: int) -> dict[str, Callable[[], object]]:
-    """What the engine does for `count` points, in PyTorch."""
+    """Returns the work of the kernels for `count` points, in PyTorch."""
     torch.manual_seed(1)
     weights = [w.detach().requires_grad_(True) for w in FieldBases(shape).constant]
     points = torch.randn(count, 3)
@@ -77,7 +77,7 @@ def torch_works(shape: FieldShape, count: int) -> dict[str, Callable[[], object]
 
 
 def best_us(work: Callable[[], object], seconds: float = SECONDS) -> float:
-    """Microseconds of the fastest of many runs."""
+    """Returns microseconds of the fastest of many runs."""
     work()
     best, spent = float("inf"), 0.0
     while spent < seconds:
@@ -89,8 +89,8 @@ def best_us(work: Callable[[], object], seconds: float = SECONDS) -> float:
 
 
 def float_peak() -> float:
-    """Multiply-adds a second of PyTorch's fastest square matrix product, on one thread. Small ones, as the fastest of
-    many short runs: on a machine that others use, long ones are interrupted (`benchmarks.roofline` has those)."""
+    """Returns multiply-adds a second of PyTorch's fastest square matrix product on one thread. Products are small,
+    since long runs are interrupted on a machine with other load (`benchmarks.roofline` has large ones)."""
     rates = []
     for size in PEAK_SIZES:
         a, b = torch.rand(size, size), torch.rand(size, size)
@@ -100,14 +100,15 @@ def float_peak() -> float:
 
 
 def engine_us(program: Path, width: int) -> dict[tuple[str, str], float]:
-    """Of each instruction set and work, microseconds a point."""
+    """Returns microseconds a point for each instruction set and kind of work."""
     done = subprocess.run([str(program), str(width)], check=True, capture_output=True, text=True)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     return {(row["isa"], row["what"]): row["us"] for row in rows}
 
 
 def measure_kernels(program: Path = PROGRAM, width: int = WIDTH, rounds: int = ROUNDS) -> list[dict]:
-    """One row for each work and instruction set; the engine and PyTorch take turns, the fastest counts."""
+    """Returns one row for each kind of work and instruction set; kernels and PyTorch alternate, the fastest run
+    counts."""
     shape = FieldShape(width=width, surface_width=width)
     threads = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -1,4 +1,4 @@
-"""What a report needs of a fitted head: its mesh in mm or dm, and the cameras of its photos."""
+"""Converts a fitted head for reports: its mesh in mm or dm, and the cameras of its photos."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ MM_PER_M, DM_PER_M = 1000, 10
 
 
 def triangles_of(mesh: HeadMesh) -> Triangles:
-    """In mm."""
+    """Returns the mesh in mm."""
     return Triangles(mesh.positions_m.astype(np.float64) * MM_PER_M, mesh.triangles.astype(np.int64))
 
 
 def cameras_of(head: Head) -> list[Camera]:
-    """Of the photos that it was fitted to, in the order they were added; in dm."""
+    """Returns the cameras of the fitted photos in dm, in the order in which the photos were added."""
     found = [head.camera(k) for k in range(head.info.photo_count)]
     return [
         Camera(
@@ -29,5 +29,5 @@ def cameras_of(head: Head) -> list[Camera]:
 
 
 def angle_deg(a: np.ndarray, b: np.ndarray) -> float:
-    """Of the rotation from one rotation [3, 3] to another."""
+    """Returns the angle between two rotations [3, 3]."""
     return float(np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1) / 2, -1, 1))))

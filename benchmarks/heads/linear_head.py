@@ -1,7 +1,7 @@
-"""A linear head as a baseline: principal components of the vertices of the heads that the prior was trained on, fitted
-to what the same encoder sees in a photo, with the same camera model and losses as the library's first stage.
+"""Fits a linear head as a baseline: principal components of the vertices of the prior's training heads.
 
-The components are whitened, so they are normal a priori.
+They are fitted to the same encoder output for a photo, with the same camera model and losses as the library's first
+stage. The components are whitened, so they are normally distributed a priori.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MIN_SIGMA_DM = 0.01
 
 
 def read_visible(folder: Path) -> np.ndarray:
-    """Vertices [H, V, 3] (dm) of the heads in a folder of `export.heads.points`, hair included."""
+    """Reads vertices [H, V, 3] (dm) of the heads in a folder of `export.heads.points`, hair included."""
     paths = sorted(folder.glob("head-*[0-9].npz"))
     if len(paths) < 2:
         raise FileNotFoundError(f"{folder} holds no heads: run `python -m export.heads.points train` first")
@@ -35,12 +35,12 @@ def read_visible(folder: Path) -> np.ndarray:
 
 
 def principal_components(vertices: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of heads [H, V, 3]: mean [V, 3], what a standard deviation of each component adds [V, 3, count], and sigma [V],
-    each coordinate, of what they leave."""
+    """Returns the principal components of heads [H, V, 3]: mean [V, 3], the offset for a standard deviation of each
+    component [V, 3, count], and sigma [V], the residual of each coordinate."""
     flat = vertices.reshape(len(vertices), -1).astype(np.float64)
     mean = flat.mean(0)
     flat = flat - mean
-    # Fewer heads than coordinates: the eigenvectors come from the products of heads.
+    # There are fewer heads than coordinates, so the eigenvectors come from products of heads.
     values, vectors = np.linalg.eigh(flat @ flat.T)
     best = np.argsort(values)[::-1][:count]
     linear = (vectors[:, best].T @ flat).T / np.sqrt(len(flat))
@@ -71,7 +71,7 @@ class LinearHeads:
         )  # fmt: skip
 
     def mesh(self, photo: Photo, focal_px: float = 0) -> Triangles | None:
-        """Of the head of a photo, mm; None where the encoder sees none. focal_px: 0 where it is not known."""
+        """Returns the head of a photo, mm; None if the encoder finds none. focal_px: 0 if unknown."""
         try:
             seen = observations_of(look_at(self._encoder, photo.rgb[..., ::-1], tuple(photo.box), focal_px=focal_px))
             found = fit_anchors(self._model, seen)

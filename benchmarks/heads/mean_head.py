@@ -1,4 +1,4 @@
-"""The head that a prior has before it sees anybody, as a mesh: what a fitted head is compared with."""
+"""Computes the mean head of a prior as a mesh, with which fitted heads are compared."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from export.heads.prior import Prior
 from export.heads.prior_file import read_prior
 
 CELL_DM = 0.025
-COARSE = 4  # cells, where the surface is looked for
-NEAR_DM = 0.12  # of the surface: farther away the coarse distances do
+COARSE = 4  # cells of the coarse grid that finds the surface
+NEAR_DM = 0.12  # cells near the surface; farther away the coarse distances are used
 CHUNK = 1 << 16
 MM_PER_DM = 100
 
 
 def read_mean_head(bundle: Path, cell_dm: float = CELL_DM) -> Triangles:
-    """Of a bundle's prior, all codes 0, in mm."""
+    """Returns the mean head of a bundle's prior (all codes 0), in mm."""
     return mesh_of(read_prior(bundle / "prior.maqp"), cell_dm)
 
 
@@ -35,7 +35,7 @@ def _weights(prior: Prior) -> tuple[list[torch.Tensor], ...]:
 
 @torch.no_grad()
 def mesh_of(prior: Prior, cell_dm: float = CELL_DM) -> Triangles:
-    """The mean head's largest piece, closed at its cut, in mm."""
+    """Returns the mean head's largest piece, closed at its clip plane, in mm."""
     weights = _weights(prior)
 
     def distances(points: np.ndarray) -> np.ndarray:
@@ -51,11 +51,12 @@ def mesh_of(prior: Prior, cell_dm: float = CELL_DM) -> Triangles:
 def mesh_of_distances(
     distances: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, cell_dm: float = CELL_DM
 ) -> Triangles:
-    """Largest piece of the surface within the box low [3], high [3], dm; in mm. distances: of points [N, 3], dm."""
+    """Returns the largest piece of the surface within the box low [3], high [3], dm; in mm. distances: of points [N,
+    3], dm."""
     coarse = np.ceil((high - low) / (COARSE * cell_dm)).astype(int) + 1
     fine = COARSE * (coarse - 1) + 1
     axes = [a + cell_dm * np.arange(n) for a, n in zip(low, fine, strict=True)]
-    # igl counts x first.
+    # igl varies x fastest
     at = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     rough = distances(at[::COARSE, ::COARSE, ::COARSE].reshape(-1, 3)).reshape(coarse)
     values = zoom(rough, fine / coarse, order=1, grid_mode=False)
@@ -72,7 +73,7 @@ def mesh_of_distances(
 
 @torch.no_grad()
 def template_points(prior: Prior, points: np.ndarray) -> np.ndarray:
-    """Of points [N, 3] (dm) of the mean head where they lie on the template head, float64 [N, 3], dm."""
+    """Returns points [N, 3] (dm) of the mean head at given points of the template head, float64 [N, 3], dm."""
     weights, found = _weights(prior), []
     for part in torch.from_numpy(points.astype(np.float32)).split(CHUNK):
         found.append(surface(prior.shape, weights, part, geometry(prior.shape, weights, part))[1])
@@ -80,13 +81,13 @@ def template_points(prior: Prior, points: np.ndarray) -> np.ndarray:
 
 
 def outwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Triangles counter-clockwise from outside: those of a closed surface whose volume is positive."""
+    """Orients triangles counter-clockwise from outside; the volume of a closed surface is then positive."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     return faces if (a * np.cross(b, c)).sum() > 0 else faces[:, ::-1].copy()
 
 
 def largest_piece(mesh: Triangles) -> Triangles:
-    """The connected piece with the most triangles."""
+    """Returns the connected piece with the most triangles."""
     from scipy.sparse import coo_array
 
     count, edges = len(mesh.points), mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)

@@ -1,9 +1,8 @@
-"""New views of a head fitted to one photo beside images of the true head from there, in the photo's light: PSNR and a
-distance by features inside of both silhouettes. The baseline is the mean head with the photo projected onto it by the
-true camera.
+"""Compares new views of a head fitted to one photo with images of the true head, in the photo's light.
 
-Fitted and mean head lie where they fit the true head best (rigid and scale). Where the photo does not see the mean
-head, or hardly, it has the colour of the nearest place that the photo does see.
+Metrics: PSNR and a distance by features, inside both silhouettes. The baseline is the mean head with the photo
+projected onto it by the true camera. Fitted and mean head are aligned with the true head (rigid and scale). Where the
+photo does not see the mean head, or only at a flat angle, it has the colour of the nearest point that the photo sees.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from export.heads.shapes import vertex_normals
 from export.heads.surface import HeadMaker, Place
 from export.scenes.perceptual import Perceptual
 
-TURNS_DEG = (-60.0, -45.0, -30.0, 30.0, 45.0, 60.0)  # about the head's axis, from the photo's camera
+TURNS_DEG = (-60.0, -45.0, -30.0, 30.0, 45.0, 60.0)  # degrees around the head's axis, from the photo's camera
 SIDE_PX = 160
-MIN_COSINE = 0.3  # to the ray: what is seen at a flatter angle the photo does not tell
+MIN_COSINE = 0.3  # degrees to the ray; at flatter angles the photo gives no colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class View:
 
 
 def true_views(maker: HeadMaker, name: str, number: int, camera: Camera) -> list[View]:
-    """Of a made head, around from the camera of its image `number`, in that image's light."""
+    """Returns new views of a synthetic head around the camera of its image `number`, in that image's light."""
     views, lamps = drawing.made_head(maker, name, number)
     found = []
     for turn in TURNS_DEG:
@@ -52,7 +51,7 @@ def true_views(maker: HeadMaker, name: str, number: int, camera: Camera) -> list
 
 
 def moved(camera: Camera, to_mesh: Similarity) -> Camera:
-    """The same camera where a mesh is, to which `to_mesh` (mm) takes the true head."""
+    """Returns the same camera in the frame of a mesh; `to_mesh` (mm) maps the true head to it."""
     return replace(
         camera,
         rotation=camera.rotation @ to_mesh.rotation.T,
@@ -63,8 +62,8 @@ def moved(camera: Camera, to_mesh: Similarity) -> Camera:
 def view_errors(
     drawn: DrawnMesh, to_mesh: Similarity, views: Sequence[View], perceptual: Perceptual | None = None
 ) -> dict[str, float]:
-    """Means over the views, of each over the pixels that either head covers: psnr_db, and distance (lower is better),
-    if there is a network for it."""
+    """Returns means over the views, over pixels that either head covers: psnr_db, and distance (lower is better) if
+    there is a network for it."""
     psnr, distance = [], []
     for view in views:
         rgb, present = drawn.shown(moved(view.camera, to_mesh))
@@ -78,7 +77,7 @@ def view_errors(
 
 
 def _tensor(picture: np.ndarray) -> torch.Tensor:
-    """[H, W, C] in 0..255 as float32 [1, C, H, W] in 0..1."""
+    """Converts [H, W, C] in 0..255 to float32 [1, C, H, W] in 0..1."""
     return torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)[None].float() / 255
 
 

@@ -1,4 +1,4 @@
-"""Heads of another maker, to judge with: people of the Debian package sweethome3d-furniture (Reallusion, CC-BY 3.0).
+"""Makes test heads from another source: people of the Debian package sweethome3d-furniture (Reallusion, CC-BY 3.0).
 
     python -m benchmarks.heads.other_heads --out .data/heads/other
 
@@ -35,13 +35,13 @@ PACKAGE = Package(
     "CC-BY-3.0",
     "heads to judge with",
 )
-# Upright people, and how far each is turned about the vertical to face -y, degrees.
+# Standing people, and their rotation about the vertical to face -y, degrees.
 PEOPLE = {
     "female01": -90, "female02": 0, "female03": 0, "male01": 0, "male02": 25, "male03": 0, "boyStanding": 0,
     "girlStanding": 0, "holdingFemale01": 0, "holdingFemale02": 0, "holdingMale01": 0, "sitFemale01": 0,
     "sitMale01": 0, "sitMale02": 0,
 }  # fmt: skip
-HEAD_DM = 2.45  # from the crown down to below the chin
+HEAD_DM = 2.45  # dm, from the crown to below the chin
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class OtherHead:
 
 
 def unpacked(folder: Path) -> Path:
-    """The people's folder, fetched and unpacked where it is not there yet."""
+    """Returns the people's folder; fetches and unpacks it if it is missing."""
     out = folder / "people"
     if not out.exists():
         subprocess.run(["dpkg", "-x", str(fetch(PACKAGE)), str(folder / "package")], check=True)
@@ -66,7 +66,7 @@ def unpacked(folder: Path) -> Path:
 
 
 def load_head(folder: Path, name: str, turn_deg: float) -> OtherHead:
-    """The upper part of a person."""
+    """Returns the upper part of a person."""
     parts = trimesh.load(folder / name / f"{name}.obj", process=False, force="scene")
     positions, faces, uv, images, which = [], [], [], [], []
     start = 0
@@ -115,7 +115,7 @@ def load_head(folder: Path, name: str, turn_deg: float) -> OtherHead:
 
 
 def seen_points(head: OtherHead, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Points [count, 3] of the surface above the chin, as evenly spread as cameras on all sides see it."""
+    """Returns points [count, 3] of the surface above the chin, evenly spread over what cameras on all sides see."""
     lamps, found = sample_lamps(rng), []
     for pitch in (-0.5, 0.3, 1.0):
         for yaw in np.arange(8) * np.pi / 4:
@@ -141,7 +141,7 @@ def main() -> None:
         rows = []
         while len(rows) < arguments.views:
             camera = sample_camera(surface, rng)
-            away = -camera.rotation[2]  # from the head to the camera
+            away = -camera.rotation[2]  # dm from the head to the camera
             if abs(np.arctan2(away[0], -away[1])) < np.radians(50):
                 rows.append(picture_row(head.scene.seen(camera, sample_lamps(rng))))
         pictures = HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))

@@ -1,5 +1,8 @@
-"""Photos of heads whose shape is known, made from stored images (`export.heads.view_shards`, `other_heads`): in front
-of photographs without people, framed as cameras frame them, so that the principal point is the photo's middle."""
+"""Makes photos of heads with known shape from stored images (`export.heads.view_shards`, `other_heads`).
+
+Heads are in front of photographs without people, framed like camera photos, so that the principal point is the middle
+of the photo.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,14 @@ from export.heads.made_heads import make_head
 from export.heads.sampling import sample_extras
 from export.heads.surface import Head, HeadMaker, cut_distance
 
-HEAD = 255  # of masks
+HEAD = 255  # threshold of masks
 MAX_YAW_DEG, MAX_PITCH_DEG = 45.0, 35.0
 FRONT_YAW_DEG, SIDE_YAW_DEG = 20.0, (35.0, 110.0)
 # Focal length by the photo's long side, of phones (wide to telephoto) and portrait lenses.
 FOCAL_OF_LONG_SIDE = (0.7, 1.6)
 NARROW_BY_LONG = 0.75
-MARGIN = 1.1  # a photo is so much larger than what it must show of the head
-DARK_SKIN, LIGHT_SKIN = 110, 180  # grey values between kinds of skin
+MARGIN = 1.1  # ratio of the photo's size to the part that must show the head
+DARK_SKIN, LIGHT_SKIN = 110, 180  # grey values between skin tones
 NOISE = 1.5  # standard deviation, of 0..255
 
 
@@ -48,15 +51,15 @@ class TrueHead:
     name: str
     pictures: HeadPictures
     true: TruePoints
-    traits: Mapping[str, str] = field(default_factory=dict)  # what is known of it: hair, skin, glasses
+    traits: Mapping[str, str] = field(default_factory=dict)  # known traits: hair, skin, glasses
 
     def front(self) -> int | None:
-        """The first image from less than 45 degrees to the side; None: there is none."""
+        """Returns the first image from less than 45 degrees to the side; None if there is none."""
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
         return next((k for k in shown if _is_from(self.pictures, k, -MAX_YAW_DEG, MAX_YAW_DEG)), None)
 
     def front_and_sides(self) -> tuple[int, int, int] | None:
-        """The first images from the front, the left and the right; None: one of these is missing."""
+        """Returns the first images from the front, the left and the right; None if one is missing."""
         near, far = SIDE_YAW_DEG
         spans = ((-FRONT_YAW_DEG, FRONT_YAW_DEG), (near, far), (-far, -near))
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
@@ -64,12 +67,12 @@ class TrueHead:
         return None if None in found else tuple(found)
 
     def all_around(self, count: int) -> tuple[int, ...] | None:
-        """The first `count` images from anywhere; None: there are fewer."""
+        """Returns the first `count` images from anywhere; None if there are fewer."""
         shown = [k for k in range(len(self.pictures.rgb)) if _is_whole(self.pictures, k)]
         return tuple(shown[:count]) if len(shown) >= count else None
 
     def seen_by(self, cameras: Sequence[Camera]) -> np.ndarray | None:
-        """Which of the true points, [N], these cameras see; None where the whole surface is not known."""
+        """Returns which of the true points, [N], these cameras see; None if the whole surface is unknown."""
         true = self.true
         if true.mesh is None or true.normals is None:
             return None
@@ -78,7 +81,7 @@ class TrueHead:
 
 
 class PhotoBackgrounds:
-    """Photographs without people, cut to any size."""
+    """Photographs without people, cropped to any size."""
 
     def __init__(self, folder: Path) -> None:
         self.paths = sorted(p for p in folder.rglob("*") if p.suffix in (".jpg", ".png"))
@@ -86,7 +89,7 @@ class PhotoBackgrounds:
             raise FileNotFoundError(f"{folder} holds no photos: run `python -m export.photos backgrounds` first")
 
     def cut(self, rng: np.random.Generator, width: int, height: int) -> np.ndarray:
-        """A random part of a random photo, RGB uint8 [height, width, 3]."""
+        """Returns a random part of a random photo, RGB uint8 [height, width, 3]."""
         image = cv2.imread(str(self.paths[rng.integers(len(self.paths))]))[..., ::-1]
         scale = max(width / image.shape[1], height / image.shape[0]) * rng.uniform(1, 1.4)
         image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA if scale < 1 else 1)
@@ -96,7 +99,8 @@ class PhotoBackgrounds:
 
 
 def yaw_pitch_deg(rotation: np.ndarray) -> tuple[float, float]:
-    """From where a camera sees the head: 0, 0 from the front, positive from the person's left and from above."""
+    """Returns the direction from which a camera sees the head: 0, 0 is the front, positive is the person's left and
+    above."""
     away = -rotation[2]
     return float(np.degrees(np.arctan2(away[0], -away[1]))), float(np.degrees(np.arcsin(np.clip(away[2], -1, 1))))
 
@@ -107,7 +111,7 @@ def _is_from(pictures: HeadPictures, k: int, low: float, high: float) -> bool:
 
 
 def _is_whole(pictures: HeadPictures, k: int) -> bool:
-    """Whether the image shows the head and its border does not cut it off, but at the neck."""
+    """Returns whether the image shows the head without truncation at its border, except at the neck."""
     mask = pictures.masks[k] == HEAD
     return bool(mask.any() and not mask[0].any() and not mask[:, 0].any() and not mask[:, -1].any())
 
@@ -120,16 +124,16 @@ def camera_of(pictures: HeadPictures, k: int) -> Camera:
 
 
 def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng: np.random.Generator) -> Photo:
-    """Image k as a camera takes it. What the image shows of the bust goes on beyond its border."""
+    """Returns image k as a camera takes it. The bust continues beyond the border of the stored image."""
     camera, mask = camera_of(pictures, k), pictures.masks[k] == HEAD
     y, x = np.nonzero(mask)
     box = np.array([x.min(), y.min(), x.max() + 1, y.max() + 1], np.float64)
-    # Half the photo reaches from the principal point over the head's box.
+    # Half of the photo reaches from the principal point over the head's box.
     reach = MARGIN * np.abs(box.reshape(2, 2) - 0.5 - [camera.cx_px, camera.cy_px]).max(0)
     long = camera.fx_px / np.exp(rng.uniform(*np.log(FOCAL_OF_LONG_SIDE)))
     width = 2 * int(np.ceil(max(NARROW_BY_LONG * long / 2, reach[0])))
     height = 2 * int(np.ceil(max(long / 2, reach[1])))
-    # The image moves by less than half a pixel, so that it need not be sampled anew; the camera knows of it.
+    # The image moves by less than half a pixel, so that it is not resampled; the camera includes this shift.
     left = round(camera.cx_px - (width - 1) / 2)
     top = round(camera.cy_px - (height - 1) / 2)
     side = pictures.rgb.shape[1]
@@ -148,15 +152,15 @@ def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng:
 
 
 def generator(name: str, k: int) -> np.random.Generator:
-    """Of what is random about a photo: depends on the head's name and the image's number alone."""
+    """Returns the random generator of a photo; it depends on the head's name and the image's number alone."""
     return np.random.default_rng([zlib.crc32(f"heads-report/{name}".encode()), k])
 
 
 def read_made_heads(
     data: Path, count: int | None = None, maker: HeadMaker | None = None, split: str = "test"
 ) -> list[TrueHead]:
-    """Heads of this project's maker: images in data/views, points in data/points. With the maker they are made again:
-    then points that cannot be seen from outside are left out, and surface and traits are known."""
+    """Reads synthetic heads: images in data/views, points in data/points. With the generator they are made again: then
+    points that cannot be seen from outside are left out, and surface and traits are known."""
     heads = []
     for path in sorted((data / "views" / split).glob("head-*[0-9].npz"))[:count]:
         with np.load(data / "points" / split / path.name) as stored:
@@ -182,7 +186,7 @@ def read_made_heads(
 
 
 def traits_of(head: Head, number: int) -> dict[str, str]:
-    """What reports group made heads by; number: of its file, on which its glasses depend."""
+    """Returns the traits by which reports group synthetic heads; number: of its file, which decides its glasses."""
     light = float(head.tone @ [0.299, 0.587, 0.114])
     extras = sample_extras(np.random.default_rng([zlib.crc32(b"views"), number]))
     return {
@@ -194,7 +198,7 @@ def traits_of(head: Head, number: int) -> dict[str, str]:
 
 
 def read_other_heads(data: Path, count: int | None = None) -> list[TrueHead]:
-    """Heads of another maker in data/other (`benchmarks.heads.other_heads`); none where they were not fetched."""
+    """Reads heads of another source in data/other (`benchmarks.heads.other_heads`); none if they were not fetched."""
     heads = []
     for path in sorted((data / "other").glob("*.npz"))[:count]:
         with np.load(path) as stored:

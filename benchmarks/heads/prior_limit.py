@@ -1,5 +1,7 @@
-"""What the prior can say at best: its codes fitted to the true distances of test heads instead of to photos, and how
-far the surface is then from the true points. No fit to photos can be expected below that, but by luck."""
+"""Measures the best head that the prior can represent: codes fitted to the true distances of test heads, not to photos.
+
+The metric is the distance of that surface from the true points. A fit to photos is not expected to be better.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ from export.heads.train_prior import HeadTensors, fitted_codes
 
 
 def measure_prior(bundle: Path, points: Path, heads: Sequence[TrueHead], steps: int = 250) -> list[dict]:
-    """points: folder of the test heads' points (`export.heads.points`). Of each head mean distances of the true points
-    that count, mm, without alignment: with fitted codes, and `mean_...` of the mean head."""
+    """points: folder of the test heads' points (`export.heads.points`). Returns for each head mean distances of the
+    true points that count, mm, without alignment: with fitted codes, and `mean_...` for the mean head."""
     bases, stored = bases_of(read_prior(bundle / "prior.maqp")), []
     for head in heads:
         with np.load(points / f"{head.name}.npz") as file:

@@ -1,4 +1,4 @@
-"""What an app waits and pays for: `maquette head` from a photo to a GLB, its time, peak memory and sizes of files."""
+"""Measures `maquette head` as a whole, from a photo to a GLB: its time, peak memory and sizes of files."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ PROGRAM = Path("build/release/stage/bin/maquette")
 KIB, MB = 1024, 1e6
 
 
-# A small process in between: the peak of a process counts what it was before it became another program, which is a copy
-# of the one that started it.
+# A small process starts the program: the peak of a process includes its size before exec, which is a copy of its
+# parent.
 _COUNTED = """
 import resource, subprocess, sys, time
 start = time.perf_counter()
@@ -29,7 +29,7 @@ print(code, time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHIL
 
 
 def run_counted(command: Sequence[str], output: Path) -> tuple[float, float]:
-    """Wall-clock seconds and peak memory (MB) of a program, whose output goes to a file. Raises OSError where it
+    """Returns wall-clock seconds and peak memory (MB) of a program, whose output goes to a file. Raises OSError if it
     fails."""
     counted = [sys.executable, "-S", "-c", _COUNTED, str(output), *command]
     done = subprocess.run(counted, check=True, capture_output=True, text=True)
@@ -41,8 +41,8 @@ def run_counted(command: Sequence[str], output: Path) -> tuple[float, float]:
 
 
 def measure_program(bundle: Path, photo: Photo, repeats: int = 3, program: Path = PROGRAM) -> list[dict]:
-    """From a photo whose head's box is known to a GLB: at a glance (`--seconds 0`) and with the default time. The
-    fastest of the repeats, the largest memory."""
+    """Measures a photo with a known head box: with `--seconds 0` and with the default time. Returns the fastest repeat
+    and the largest memory."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         picture, output = Path(folder, "photo.png"), Path(folder, "output.json")

@@ -1,4 +1,4 @@
-"""Heads from photos against the true ones: distances in mm by seconds of fitting, beside the mean head.
+"""Measures heads from photos against the true heads: distances in mm by seconds of fitting, beside the mean head.
 
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
@@ -52,13 +52,13 @@ KNOWN, EIGHT = "one photo, focal length known", "eight photos"
 BUNDLE, DATA, BACKGROUNDS = Path("sdk/models/heads-int8"), Path(".data/heads"), Path(".data/backgrounds/test")
 METRICS = Path("build/benchmarks/heads.json")
 PERCEPTUAL = Path(".data/teachers/backbone.pt")
-TEXTURE_PX = 512  # a side
+TEXTURE_PX = 512  # pixels a side
 SECONDS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
 class HeadSet:
-    """Heads, each with the numbers of the images that it is fitted to, at these times of fitting."""
+    """Heads, each with the numbers of its images for the fit, and the times of fitting."""
 
     name: str
     heads: Sequence[tuple[TrueHead, Sequence[int]]]
@@ -68,8 +68,7 @@ class HeadSet:
 
 @dataclass(frozen=True, eq=False)
 class Baselines:
-    """What heads are measured beside, besides the mean head; None is left out. maker draws new views, perceptual
-    compares them."""
+    """Baselines besides the mean head; None is left out. maker draws new views, perceptual compares them."""
 
     linear: LinearHeads | None = None
     face: FaceMeshes | None = None
@@ -86,8 +85,8 @@ def photos_of(head: TrueHead, numbers: Iterable[int], backgrounds: PhotoBackgrou
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Photos of a head, and what is true of them. seen: which of the true points the photos show; views: new ones, that
-    `perceptual` compares, too."""
+    """Photos of a head, and its ground truth. seen: true points that the photos show; views: new views, which
+    `perceptual` compares too."""
 
     head: TrueHead
     photos: Sequence[Photo]
@@ -104,13 +103,13 @@ class Case:
         return Case(head, photos, seen, views, others.perceptual)
 
     def view_errors(self, drawn: DrawnMesh, to_mesh: Similarity) -> dict[str, float]:
-        """`view_...` of a mesh."""
+        """Returns `view_...` of a mesh."""
         found = view_errors(drawn, to_mesh, self.views, self.perceptual)
         return {f"view_{key}": value for key, value in found.items()}
 
 
 def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_focal: bool = False) -> dict:
-    """`mean_...` of the mean head; of one photo also `linear_...` and `face_mesh_inner_face_mm`."""
+    """Returns `mean_...` of the mean head; for one photo also `linear_...` and `face_mesh_inner_face_mm`."""
     true, photo = case.head.true, case.photos[0]
     found = {f"mean_{key}": value for key, value in asdict(measure(mesh=mean, true=true, seen=case.seen)).items()}
     if case.views:
@@ -130,7 +129,7 @@ def measure_baselines(case: Case, mean: Triangles, others: Baselines, known_foca
 
 
 def add_photos(builder: HeadBuilder, photos: Sequence[Photo], known_focal: bool) -> None:
-    """In place of those that the builder has."""
+    """Replaces the photos of the builder."""
     builder.clear()
     for photo in photos:
         builder.add_photo(photo.rgb, photo.box, focal_px=photo.camera.fx_px if known_focal else None)
@@ -139,7 +138,7 @@ def add_photos(builder: HeadBuilder, photos: Sequence[Photo], known_focal: bool)
 def measure_head(
     builder: HeadBuilder, case: Case, baselines: dict, seconds: Sequence[float], known_focal: bool = False
 ) -> list[dict]:
-    """One row for each time of fitting. A row of a head that was not found has `missing`, which says why."""
+    """Returns one row for each time of fitting. The row of a head that was not found has `missing` with the reason."""
     photos = case.photos
     about = {
         "head": case.head.name,
@@ -157,14 +156,15 @@ def measure_head(
 
 @dataclass(frozen=True, eq=False)
 class Painter:
-    """What new views are drawn of: a builder that makes textures, and its time of fitting."""
+    """Draws new views: a builder that makes textures, and its time of fitting."""
 
     builder: HeadBuilder
     at_s: float
 
 
 def measure_views(painter: Painter, case: Case, known_focal: bool = False) -> dict:
-    """`view_...` of the fitted head with its texture, `coloured_view_...` without; nothing where no head is found."""
+    """Returns `view_...` of the fitted head with its texture, and `coloured_view_...` without; nothing if no head is
+    found."""
     try:
         add_photos(painter.builder, case.photos, known_focal)
         with painter.builder.fit(painter.at_s) as result:
@@ -178,7 +178,7 @@ def measure_views(painter: Painter, case: Case, known_focal: bool = False) -> di
 
 
 def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
-    """Metrics of a fit to the photos that the builder has. Raises MaquetteError."""
+    """Returns the metrics of a fit to the builder's photos. Raises MaquetteError."""
     true = case.head.true
     with builder.fit(asked_s) as result:
         start = time.perf_counter()
@@ -197,7 +197,7 @@ def fitted(builder: HeadBuilder, case: Case, asked_s: float) -> dict:
         "mesh_ms": mesh_ms,
         "used_photos": stats["used_photo_count"],
         "focal_ratio": float(np.median([camera.fx_px / photo.camera.fx_px for camera, photo in pairs])),
-        # Frames of heads of another maker lie otherwise in their heads.
+        # Heads of another source have another frame.
         "rotation_deg": float(np.median([angle_deg(camera.rotation, photo.camera.rotation) for camera, photo in pairs]))
         if true.normals is not None
         else None,
@@ -208,7 +208,7 @@ def measure_set(
     builder: HeadBuilder, own: HeadSet, backgrounds: PhotoBackgrounds, mean: Triangles,
     others: Baselines = NOTHING_ELSE, painter: Painter | None = None,
 ) -> list[dict]:  # fmt: skip
-    """Rows of a set; those at the painter's time have new views, where they can be drawn."""
+    """Returns the rows of a set; rows at the painter's time have new views if they can be drawn."""
     rows = []
     for head, numbers in tqdm(own.heads, desc=own.name, unit="head", disable=None):
         case = Case.of(head, numbers, backgrounds, others)
@@ -223,7 +223,7 @@ def measure_set(
 
 
 def sets_of(options: argparse.Namespace, maker: HeadMaker | None = None) -> list[HeadSet]:
-    """The sets that are asked for and there, with the images that each head is fitted to."""
+    """Returns the requested sets that exist, with the images for each head's fit."""
     made, seconds = read_made_heads(options.data, options.heads, maker), sorted(options.seconds)
     front = [(head, [k]) for head in made if (k := head.front()) is not None]
     found = []
@@ -243,7 +243,7 @@ def sets_of(options: argparse.Namespace, maker: HeadMaker | None = None) -> list
 
 
 def baselines_of(options: argparse.Namespace, bundle: Path, maker: HeadMaker) -> Baselines:
-    """Those whose data are there; a warning names the others."""
+    """Returns the baselines with data; a warning names the others."""
     linear = face = None
     try:
         linear = LinearHeads(bundle, maker, read_visible(options.data / "points/train"))
@@ -284,7 +284,7 @@ def parsed(arguments: Sequence[str] | None = None, parser: argparse.ArgumentPars
 
 
 def run(options: argparse.Namespace) -> dict:
-    """Measures all that `parsed` says, and writes the metrics."""
+    """Measures with the options, and writes the metrics."""
     maker = make_maker()
     sets, backgrounds, rows = sets_of(options, maker), PhotoBackgrounds(options.backgrounds), []
     for number, bundle in enumerate(options.bundles):
@@ -310,7 +310,7 @@ def run(options: argparse.Namespace) -> dict:
 
 
 def shortened(value: Any) -> Any:
-    """Numbers with the digits that mean something."""
+    """Rounds numbers to significant digits."""
     if isinstance(value, dict):
         return {key: shortened(part) for key, part in value.items()}
     if isinstance(value, list):

@@ -1,7 +1,7 @@
-"""Real photographs held out of training: where points of the fitted head are drawn beside where MediaPipe's face
-network sees them, and its silhouette beside the person's mask. Neither is told to the fit.
+"""Measures real photographs that training did not see: points and silhouette of the fitted head.
 
-The network's points are places of the template head (`export.heads.photos`), and so is each point of a fitted mesh. The
+Points are compared with MediaPipe's face network, the silhouette with the person's mask. The fit gets neither. The
+network's points are landmarks on the template head (`export.heads.photos`), and so is each vertex of a fitted mesh. The
 baseline is the mean head, posed by the same encoder's template points, with the same camera model.
 """
 
@@ -28,14 +28,14 @@ from export.heads.prior_file import read_prior
 from export.heads.shapes import vertex_normals
 from export.teachers.faces import LEFT_EYE, RIGHT_EYE
 
-SPLITS = ("val", "test")  # the encoder's training saw neither; val told when to end it
+SPLITS = ("val", "test")  # no training of the encoder saw these; val decided when to end it
 
 
 @dataclass(frozen=True, eq=False)
 class RealFace:
-    """rgb: the photo, uint8 [H, W, 3]; box: of the head; square: middle x, y and side of its crop, pixels of the photo;
-    pixel [P, 2] of the photo where the template points [P, 3] (dm) are seen, as far as weight [P] is above 0; matte: as
-    `PhotoFaces` has it; eyes_px: between the outer corners of the eyes."""
+    """rgb: the photo, uint8 [H, W, 3]; box: of the head; square: middle x, y and side of its crop, photo pixels; pixel
+    [P, 2] of the template points [P, 3] (dm) in the photo, valid if weight [P] is above 0; matte: as in `PhotoFaces`;
+    eyes_px: distance of the outer corners of the eyes."""
 
     name: str
     split: str
@@ -59,13 +59,13 @@ class PosedMesh:
     camera: Camera
 
     def at(self, template: np.ndarray) -> np.ndarray:
-        """Its points [N, 3] that are these template points, or are nearest to them on the template."""
+        """Returns its points [N, 3] at the given template points, or nearest to them on the template."""
         _, face, near = igl.point_mesh_squared_distance(
             np.ascontiguousarray(template, np.float64), self.template, self.faces
         )
         corners = (np.ascontiguousarray(self.template[self.faces[face, k]]) for k in range(3))
         weight = igl.barycentric_coordinates(np.ascontiguousarray(near), *corners)
-        # A triangle that is a point on the template has no such coordinates.
+        # A triangle that is degenerate on the template has no such coordinates.
         weight = np.where(np.isfinite(weight).all(1, keepdims=True), weight, 1 / 3)
         return (self.points[self.faces[face]] * weight[..., None]).sum(1)
 
@@ -91,8 +91,8 @@ def real_faces(photos: Path, faces: Path, splits: Sequence[str] = SPLITS) -> Ite
 
 
 def metrics_of(face: RealFace, mesh: PosedMesh) -> dict:
-    """points_px: mean distance of its points from where the network sees them; points: the same by the distance of the
-    eyes' corners; matte_iou: None where the person's mask says nothing of the head."""
+    """points_px: mean distance of its points from the network's points; points: the same relative to the eye distance;
+    matte_iou: None if the person's mask does not cover the head."""
     used = face.weight > 0
     away = np.linalg.norm(mesh.camera.projected(mesh.at(face.template[used]))[0] - face.pixel[used], axis=1)
     points_px = float(np.average(away, weights=face.weight[used]))
@@ -112,7 +112,7 @@ def matte_iou(face: RealFace, mesh: PosedMesh) -> float | None:
 
 
 class MeanHeads:
-    """The mean head of a bundle, posed in photos by what its encoder sees."""
+    """The mean head of a bundle, posed in photos by its encoder's output."""
 
     def __init__(self, bundle: Path) -> None:
         self._encoder, self._prior = Encoder(bundle), read_prior(bundle / "prior.maqp")
@@ -121,7 +121,7 @@ class MeanHeads:
         self._template = template_points(self._prior, self._points)
 
     def posed(self, rgb: np.ndarray, box: np.ndarray) -> PosedMesh:
-        """Raises ValueError where the encoder sees no head."""
+        """Returns the posed mean head. Raises ValueError if the encoder finds no head."""
         seen = observations_of(look_at(self._encoder, rgb[..., ::-1], tuple(box)))
         found = fit_anchors(self._prior, seen, moves_codes=False).pose.camera()
         height, width = rgb.shape[:2]
@@ -131,7 +131,7 @@ class MeanHeads:
 
 
 def fitted_mesh(builder: HeadBuilder, face: RealFace, seconds: float) -> PosedMesh:
-    """Raises MaquetteError."""
+    """Returns the fitted head. Raises MaquetteError."""
     builder.clear()
     builder.add_photo(face.rgb, face.box)
     with builder.fit(seconds) as head:
@@ -143,7 +143,7 @@ def fitted_mesh(builder: HeadBuilder, face: RealFace, seconds: float) -> PosedMe
 def measure_real(
     bundle: Path, photos: Path, faces: Path, seconds: Sequence[float], count: int | None = None, threads: int = 0
 ) -> list[dict]:
-    """One row a face and time of fitting, at most `count` faces; none where there are no photographs."""
+    """Returns one row for each face and time of fitting, at most `count` faces; none without photographs."""
     found, rows = list(real_faces(photos, faces))[:count], []
     if not found:
         return rows

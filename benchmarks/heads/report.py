@@ -1,4 +1,4 @@
-"""The page of what `python -m benchmarks.heads` measured."""
+"""Writes the page of `python -m benchmarks.heads`."""
 
 from __future__ import annotations
 
@@ -54,7 +54,8 @@ _TRAITS = ("hair", "beard", "skin", "glasses")
 
 
 def beside(rows: Sequence[Mapping], bundles: Sequence[str], at_s: float) -> str:
-    """Further bundles beside the first: how much farther the first is off, on heads that both found."""
+    """Compares further bundles with the first: how much larger the first one's distance is, on heads that both
+    found."""
     lines = []
     own = {(r["bundle"], r["set"], r["head"]): r for r in found(rows) if r["asked_s"] == at_s}
     for other in bundles[1:]:
@@ -75,7 +76,7 @@ def _title(text: str) -> str:
 
 
 def warning(rows: Sequence[Mapping], at_s: float) -> str:
-    """Of fits that time ended too early; empty where there is none."""
+    """Returns a warning if time ended the fits too early; otherwise ""."""
     if not ended_too_early(rows, at_s):
         return ""
     steps = median(row["steps"] for row in found(rows) if row["asked_s"] == at_s)
@@ -87,7 +88,7 @@ def warning(rows: Sequence[Mapping], at_s: float) -> str:
 
 
 def _set_parts(name: str, own: Sequence[Mapping], at_s: float) -> list[str]:
-    """What is said of one set."""
+    """Returns the parts of one set."""
     parts = [_title(name), by_seconds(own)]
     now = [row for row in own if row["asked_s"] == at_s]
     if name == "one photo":
@@ -121,7 +122,7 @@ def _program_parts(rows: Sequence[Mapping]) -> list[str]:
 
 
 def _more_parts(measured: Mapping, sheet: str) -> list[str]:
-    """Real photographs, settings, the program, the engine, the sheet: those that were measured."""
+    """Returns the parts on real photographs, settings, the program, the kernels and the contact sheet, if measured."""
     at_s, parts = measured["at_s"], []
     if own := measured.get("prior"):
         mm = [f"{fmean(row[key] for row in own):.2f}" for key in ("face_mm", "head_mm", "mean_face_mm", "mean_head_mm")]
@@ -159,7 +160,7 @@ def _more_parts(measured: Mapping, sheet: str) -> list[str]:
 
 
 def page(measured: Mapping, sheet: str = "") -> str:
-    """The whole report, Markdown. sheet: the image's name, in the page's folder."""
+    """Returns the whole report in Markdown. sheet: file name of the contact sheet, in the page's folder."""
     at_s, bundles, machine = measured["at_s"], measured["bundles"], measured["machine"]
     rows = [row for row in measured["rows"] if row["bundle"] == bundles[0]]
     parts = [

@@ -1,4 +1,4 @@
-"""Tables of what was measured, Markdown: by seconds of fitting, by what heads have in common, beside baselines."""
+"""Writes tables in Markdown: by seconds of fitting, by traits of heads, beside baselines."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import pairwise
 from statistics import fmean, median
 
 FOCAL_WITHIN = 0.2
-MIN_STEPS = 20  # fits that time ends before that say little
+MIN_STEPS = 20  # fits that time ends earlier are not reliable
 YAWS_DEG, SIZES_PX = (0, 15, 30, 45), (0, 120, 150, 180, 1000)
 _HEADER = (
     "seconds", "found", "face, mm", "by mean head", "head, mm", "by mean head", "not aligned, mm", "by mean head",
@@ -20,33 +20,33 @@ def table(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
 
 def found(rows: Sequence[Mapping]) -> list[Mapping]:
-    """Rows of heads that were fitted."""
+    """Returns the rows of heads that were fitted."""
     return [row for row in rows if "missing" not in row]
 
 
 def having(rows: Sequence[Mapping], *keys: str) -> list[Mapping]:
-    """Rows of heads that were fitted, of which all of these are known."""
+    """Returns the rows of fitted heads with all these values."""
     return [row for row in found(rows) if all(row.get(key) is not None for key in keys)]
 
 
 def ratio(rows: Sequence[Mapping], what: str, baseline: str = "mean") -> float:
-    """Mean figure by that of a baseline on the same heads."""
+    """Returns the mean metric divided by that of a baseline on the same heads."""
     return fmean(row[what] for row in rows) / fmean(row[f"{baseline}_{what}"] for row in rows)
 
 
 def focal_within(rows: Sequence[Mapping]) -> float:
-    """The fraction of heads whose focal length is right to 20 %."""
+    """Returns the fraction of heads with a focal length within 20 % of the true one."""
     return fmean(abs(row["focal_ratio"] - 1) <= FOCAL_WITHIN for row in rows if row["focal_ratio"])
 
 
 def ended_too_early(rows: Sequence[Mapping], at_s: float) -> bool:
-    """Whether time ended half of the fits before they got anywhere."""
+    """Returns whether time ended half of the fits too early."""
     steps = [row["steps"] for row in found(rows) if row["asked_s"] == at_s > 0]
     return bool(steps) and median(steps) < MIN_STEPS
 
 
 def by_seconds(rows: Sequence[Mapping]) -> str:
-    """One line a time of fitting, after the mean head's."""
+    """Returns one line for each time of fitting, after the mean head's line."""
     times = sorted({row["asked_s"] for row in rows})
     first = found([row for row in rows if row["asked_s"] == times[0]])
     lines = []
@@ -78,7 +78,7 @@ def by_seconds(rows: Sequence[Mapping]) -> str:
 
 
 def by_group(rows: Sequence[Mapping], header: str, group_of: Callable[[Mapping], str | None]) -> str:
-    """Rows of one time of fitting, one line for each group, in the groups' order; empty where there are none."""
+    """Returns one line for each group, at one time of fitting; empty if there are none."""
     groups: dict[str, list[Mapping]] = {}
     for row in found(rows):
         groups.setdefault(group_of(row) or "", []).append(row)
@@ -92,13 +92,13 @@ def by_group(rows: Sequence[Mapping], header: str, group_of: Callable[[Mapping],
 
 
 def _order(name: str) -> tuple[float, str]:
-    """Numbers in their order, then words."""
+    """Sorts numbers by value, then words."""
     start = name.split()[0]
     return (float(start), "") if start.isdigit() else (float("inf"), name)
 
 
 def span_of(value: float, limits: Sequence[int], unit: str) -> str | None:
-    """Between which of the limits a value lies; the last one belongs to the last span."""
+    """Names the range of a value; the last limit belongs to the last range."""
     for low, high in pairwise(limits):
         if low <= value < high or value == high == limits[-1]:
             return f"{low} to {high}{unit}"
@@ -122,8 +122,7 @@ PARTS = (
 
 
 def by_baseline(rows: Sequence[Mapping], at_s: float) -> str:
-    """Rows of one set: the fitted head at one time and at a glance beside all baselines, over the same heads: those for
-    which everybody has an answer."""
+    """Returns the fitted head, at one time and at 0 s, beside all baselines, over the heads that all methods found."""
     own = [row for row in found(rows) if row["asked_s"] == at_s]
     glance = {row["head"]: row for row in found(rows) if row["asked_s"] == 0 and at_s != 0}
     names = [("mean", "mean head")]
@@ -151,7 +150,7 @@ def by_baseline(rows: Sequence[Mapping], at_s: float) -> str:
 
 
 def by_real_face(rows: Sequence[Mapping]) -> str:
-    """Real photographs by seconds of fitting, after the mean head."""
+    """Returns real photographs by seconds of fitting, after the mean head."""
     times = sorted({row["asked_s"] for row in rows})
     lines = []
     for asked in times:

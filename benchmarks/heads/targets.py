@@ -7,19 +7,18 @@ from statistics import fmean, median
 
 from benchmarks.heads.tables import ended_too_early, focal_within, found, having, ratio, table
 
-LONG_ENOUGH_S = 1.0  # from then on more time must not make it worse
+LONG_ENOUGH_S = 1.0  # from then on, more time must not increase the error
 ONE, THREE, OTHER = "one photo", "three photos", "other maker's heads, one photo"
 
 
 def over(values: Mapping[float, float]) -> float:
-    """How far the error, by seconds, rises above its lowest once there was time enough, as a fraction."""
+    """Returns by which fraction the error, by seconds, rises above its minimum after LONG_ENOUGH_S."""
     long = [value for asked, value in values.items() if asked >= LONG_ENOUGH_S]
     return max(long) / min(long) - 1 if long else 0.0
 
 
 class _Lines:
-    """are_fits_whole: false where time ended the fits too early; then what depends on them, or is a time, counts as not
-    measured."""
+    """are_fits_whole: false if time ended the fits too early; metrics of fits and times then count as not measured."""
 
     def __init__(self, are_fits_whole: bool) -> None:
         self.lines: list[list[str]] = []
@@ -46,7 +45,7 @@ class _Lines:
 
 
 def targets(measured: Mapping) -> str:
-    """Metrics of the first bundle; what was not measured is left out."""
+    """Returns the table of the first bundle; metrics that were not measured are left out."""
     rows = [row for row in measured["rows"] if row["bundle"] == measured["bundles"][0]]
     at_s = measured["at_s"]
     lines = _Lines(not ended_too_early(rows, at_s))
@@ -117,7 +116,7 @@ def _of_kernels(measured: Mapping, lines: _Lines) -> None:
     own = [row for row in measured.get("field_kernels", ()) if row["what"] == "forward, back to all weights"]
     if own:
         best = min(own, key=lambda row: row["us"])
-        # More than the peak cannot be: others kept PyTorch from showing it.
+        # A fraction above 1 is impossible: other processes slowed PyTorch's peak.
         how = {"of_fit": False, "is_measured": best["fraction"] <= 1}
         by_torch = best["us"] / best["torch_us"]
         lines.add("engine: a point of a step by PyTorch, one thread", by_torch, 0.33, 0.15, **how)

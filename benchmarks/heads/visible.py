@@ -1,5 +1,8 @@
-"""Which points of a surface can be seen: from outside at all, by certain cameras. Made heads have eyeballs that are
-closed, and skin under hair: no photo shows what lies inside, and no surface of a head should go there."""
+"""Finds the points of a surface that can be seen, from outside at all or by certain cameras.
+
+Synthetic heads have closed eyeballs, and skin under hair. No photo shows what lies inside, and no head surface should
+go there.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,13 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 DIRECTIONS, MIN_FREE = 96, 2
-MIN_COSINE = 0.1  # to the normal
-START = 0.005  # above the surface; dm
+MIN_COSINE = 0.1  # minimum cosine to the normal
+START = 0.005  # offset above the surface; dm
 
 
 def _scene(positions: np.ndarray, faces: np.ndarray) -> EmbreeScene:
     scene = EmbreeScene(robust=True)
-    # Embree reads the scene's mesh as long as the scene is there.
+    # Embree reads the mesh of the scene for as long as the scene exists.
     TriangleMesh(scene, positions.astype(np.float32), faces.astype(np.int32))
     return scene
 
@@ -22,11 +25,11 @@ def _scene(positions: np.ndarray, faces: np.ndarray) -> EmbreeScene:
 def seen_from_outside(
     positions: np.ndarray, faces: np.ndarray, points: np.ndarray, normals: np.ndarray, directions: int = DIRECTIONS
 ) -> np.ndarray:
-    """Whether each of the points [N, 3] (dm) of the mesh is free to at least MIN_FREE of evenly spread directions: bool
-    [N]."""
+    """Returns whether each of the points [N, 3] (dm) of the mesh is free in at least MIN_FREE of evenly spread
+    directions: bool [N]."""
     scene = _scene(positions, faces)
     free = np.zeros(len(points), int)
-    # Fibonacci's sphere.
+    # Fibonacci sphere.
     z = 1 - (2 * np.arange(directions) + 1) / directions
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(directions)
     flat = np.sqrt(1 - z**2)
@@ -41,8 +44,8 @@ def seen_from_outside(
 def seen_from(
     positions: np.ndarray, faces: np.ndarray, points: np.ndarray, normals: np.ndarray, centres: np.ndarray
 ) -> np.ndarray:
-    """Whether each of the points [N, 3] (dm) of the mesh faces one of the cameras at `centres` [K, 3] with nothing
-    between: bool [N]."""
+    """Returns whether each of the points [N, 3] (dm) of the mesh faces one of the cameras at `centres` [K, 3] with
+    nothing between: bool [N]."""
     scene, seen = _scene(positions, faces), np.zeros(len(points), bool)
     for centre in centres:
         towards = centre - points

@@ -1,4 +1,4 @@
-"""Runs inside an emulator: the instructions that each network of a folder takes, as JSON.
+"""Runs inside an emulator and prints the instructions of each network of a folder, as JSON.
 
     python count_runs.py FOLDER COUNTER
 

@@ -1,6 +1,6 @@
-"""Processors of other kinds than this one, emulated by qemu: what each is here for, and work done on each.
+"""Runs programs on other kinds of processors, emulated by qemu.
 
-`scripts/test-isa.sh` makes the builds `release` and `aarch64` that they run programs of.
+The programs are those of the builds `release` and `aarch64`, which `scripts/test-isa.sh` makes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor, how to run programs on it, and the features (names of Linux) that it must and must not offer."""
+    """A processor, the command to run programs on it, and the features (Linux names) that it must and must not have."""
 
     name: str
     title: str
@@ -36,7 +36,7 @@ class Processor:
     lacks: frozenset[str] = frozenset()
 
     def command(self, program: str) -> list[str]:
-        """The command that runs a program of the build folder on this processor."""
+        """Returns the command that runs a program of the build folder on this processor."""
         return [*self.emulator, str(ROOT / "build" / self.build / program)]
 
 
@@ -63,7 +63,7 @@ OTHERS = (
 
 
 def check_features(processor: Processor) -> list[str]:
-    """The features that programs see on this processor. Raises ValueError if they are not those it is here for."""
+    """Returns the features that programs see on this processor. Raises ValueError if they are not the expected ones."""
     done = subprocess.run(
         processor.command("benchmarks/native/processor_features"), capture_output=True, text=True, check=True
     )
@@ -78,7 +78,7 @@ def check_features(processor: Processor) -> list[str]:
 
 
 def add_arguments(parser: argparse.ArgumentParser, out: Path) -> None:
-    """What `compared` reads of a command's options."""
+    """Adds the options that `compared` reads."""
     parser.add_argument("--out", type=Path, default=out, help="folder for the results (default %(default)s)")
     parser.add_argument("--only", action="append", choices=[processor.name for processor in OTHERS])
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processors at a time (default: the cores)")
@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser, out: Path) -> None:
 def compared(
     options: argparse.Namespace, run: Callable[[Processor, Path], None], compare: Callable[[Path, Path], T]
 ) -> dict[str, T | str]:
-    """Runs here and on each other processor, into a folder of its own, and compares the folders.
+    """Runs on this processor and on each other one, into a folder each, and compares the folders.
 
     Returns what `compare` says of (folder of here, of the other), or as text what went wrong there, by title. Prints
     what programs see of each processor. Raises ValueError, OSError or CalledProcessError when it fails here.
@@ -121,7 +121,7 @@ def compared(
 
 
 def run_maquette(processor: Processor, arguments: Sequence[str]) -> str:
-    """Runs the command line of a processor's build and returns its output. Raises ValueError with what went wrong."""
+    """Runs the command line of a processor's build and returns its output. Raises ValueError with the failure."""
     done = subprocess.run([*processor.command("stage/bin/maquette"), *arguments], capture_output=True, text=True)
     if done.returncode:
         raise ValueError(
@@ -131,7 +131,7 @@ def run_maquette(processor: Processor, arguments: Sequence[str]) -> str:
 
 
 def write_junit(path: Path, suite_name: str, failures: Mapping[str, str | None]) -> None:
-    """One test case a processor, by title; scripts/sum_test_results.py counts them. A failure is a sentence."""
+    """Writes one test case for each processor by title, for scripts/sum_test_results.py. A failure is a sentence."""
     suite = ElementTree.Element("testsuite", name=suite_name, tests=str(len(failures)))
     for title, failure in failures.items():
         case = ElementTree.SubElement(suite, "testcase", name=title, classname=suite_name)

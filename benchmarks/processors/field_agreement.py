@@ -25,9 +25,9 @@ SOURCES = tuple(
     f"stub:solids?scene={scene}&noise={noise}&size=320x240&seed=5"
     for scene, noise in (("shelf", "none"), ("shelf", "tof"), ("box", "tof"))
 )
-STEPS_OF_R = 1000  # of the 16-bit PNG
+STEPS_OF_R = 1000  # scale of the 16-bit PNG
 SHARP_R = 1.0
-BAR = 0.99  # of pixels on the same side of SHARP_R
+BAR = 0.99  # fraction of pixels on the same side of SHARP_R
 
 EPILOG = """\
 examples:
@@ -38,10 +38,10 @@ examples:
 
 @dataclass(frozen=True)
 class FieldAgreement:
-    """How far the fields of two folders of results agree, over all frames."""
+    """Agreement of the fields of two folders of results, over all frames."""
 
-    pixels: int  # with a distance in either
-    same_side: float  # of SHARP_R, fraction of the pixels
+    pixels: int  # pixels with a distance in either
+    same_side: float  # fraction of pixels on the same side of SHARP_R
     rms_r: float  # root mean square of the difference, in r
 
     def passes(self, bar: float) -> bool:
@@ -49,7 +49,7 @@ class FieldAgreement:
 
 
 def read_field(path: Path) -> np.ndarray:
-    """Distance in r, float32 [H, W]. Raises ValueError when it cannot be read."""
+    """Reads the distance in r, float32 [H, W]. Raises ValueError if it cannot be read."""
     image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if image is None or image.dtype != np.uint16:
         raise ValueError(f"{path} cannot be read as 16 bits; run maquette edges again.")
@@ -57,8 +57,8 @@ def read_field(path: Path) -> np.ndarray:
 
 
 def compare(reference: Path, other: Path) -> FieldAgreement:
-    """Compares two folders of results of the same frames. Raises ValueError when they are not of the same frames, or
-    when the reference has no edge at all: then there is nothing to compare."""
+    """Compares two folders of results of the same frames. Raises ValueError if they are not of the same frames, or if
+    the reference has no edge at all."""
     names, others = (sorted(path.name for path in folder.glob("*_distance.png")) for folder in (reference, other))
     if names != others:
         raise ValueError(f"{reference} has fields of {len(names)} frames, but {other} of {len(others)} or others.")
@@ -73,7 +73,8 @@ def compare(reference: Path, other: Path) -> FieldAgreement:
 
 
 def run(processor: Processor, bundle: Path, sources: Sequence[str], out: Path) -> None:
-    """Writes the fields of a frame of each source into `out`, emptied first. Raises ValueError with what went wrong."""
+    """Writes the fields of a frame of each source into `out`, which is emptied first. Raises ValueError with the
+    failure."""
     shutil.rmtree(out, ignore_errors=True)
     for k, source in enumerate(sources):
         settings = ["--bundle", str(bundle), "--threads", "1", "--max-frames", "1"]
@@ -97,7 +98,7 @@ def print_table(bundle: Path, results: dict[str, FieldAgreement | str], bar: flo
 
 
 def failure_of(found: FieldAgreement | str, bar: float) -> str | None:
-    """What is wrong, as a sentence; None if nothing is."""
+    """Returns the failure as a sentence; None if there is none."""
     if isinstance(found, str) or found.passes(bar):
         return found if isinstance(found, str) else None
     return (

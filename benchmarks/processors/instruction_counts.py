@@ -1,4 +1,4 @@
-"""Instructions of a frame of dense pose, stage by stage, on emulated processors: a figure that needs no phone.
+"""Counts the instructions of a frame of dense pose, stage by stage, on emulated processors: a metric without a phone.
 
     python -m benchmarks.processors.instruction_counts             the bundled photo, all processors; writes a table
 
@@ -39,7 +39,7 @@ STAGES = {
 
 
 def compile_library(source: str, compiler: str, out: Path) -> None:
-    """Raises ValueError with what the compiler says."""
+    """Compiles a file. Raises ValueError with the compiler's message."""
     out.parent.mkdir(parents=True, exist_ok=True)
     command = [compiler, "-O2", "-Wall", "-Wextra", "-shared", "-fPIC", "-o", str(out), str(ROOT / source)]
     try:
@@ -51,7 +51,7 @@ def compile_library(source: str, compiler: str, out: Path) -> None:
 
 
 def clock_of(build: str) -> Path:
-    """The library to preload into programs of a build."""
+    """Returns the library to preload into programs of a build."""
     return BUILD / f"instruction_clock-{build}.so"
 
 
@@ -63,7 +63,7 @@ def prepare(processors: Sequence[Processor]) -> None:
 
 
 def emulated(processor: Processor, counter: Path) -> list[str]:
-    """The command that emulates the processor and counts, before a program's own; the program's clock is the count."""
+    """Returns the command that emulates the processor and counts; the clock of the program returns the count."""
     emulator, *options = processor.emulator
     return [
         emulator, *options, "-plugin", f"{PLUGIN},counter={counter}",
@@ -72,10 +72,11 @@ def emulated(processor: Processor, counter: Path) -> list[str]:
 
 
 def counted(processor: Processor, sources: Sequence[str], bundle: Path) -> dict:
-    """The document of `maquette bench`, an instruction as a nanosecond. Raises ValueError with what failed."""
+    """Returns the document of `maquette bench`, with an instruction as a nanosecond. Raises ValueError with the
+    failure."""
     with tempfile.TemporaryDirectory() as folder:
         counter, document = Path(folder) / "counter", Path(folder) / "bench.json"
-        # The program that `maquette bench` starts: an emulator does not follow into other programs.
+        # An emulator does not follow into other programs, so the program behind `maquette bench` is started directly.
         program = ROOT / "build" / processor.build / "stage/bin/maquette-bench"
         command = [
             *emulated(processor, counter), str(program), *sources, "--bundle", str(bundle), "--threads", "1",
@@ -88,7 +89,7 @@ def counted(processor: Processor, sources: Sequence[str], bundle: Path) -> dict:
 
 
 def millions(case: dict) -> dict[str, float]:
-    """Millions of instructions of each stage, and of all of them, of one source; the median of its frames.
+    """Returns millions of instructions of each stage and of all stages, for one source; the median of its frames.
 
     Raises ValueError when the clock did not count.
     """
@@ -99,7 +100,7 @@ def millions(case: dict) -> dict[str, float]:
 
 
 def lines_of(counts: dict[str, dict[str, float]]) -> list[str]:
-    """A table in Markdown: a line for each stage, a column for each processor, of `millions` by its title."""
+    """Returns a table in Markdown: a line for each stage, a column for each processor, from `millions` by title."""
     lines = ["| stage | " + " | ".join(counts) + " |", "| --- |" + " --- |" * len(counts)]
     for stage, title in (STAGES | {"all": "all"}).items():
         lines.append(f"| {title} | " + " | ".join(f"{found[stage]:.1f}" for found in counts.values()) + " |")

@@ -41,37 +41,36 @@ examples:
 
 @dataclass
 class Agreement:
-    """How far the labels of two folders of results agree, over all images."""
+    """Agreement of the labels of two folders of results, over all images."""
 
     pictures: int = 0
-    people: int = 0  # of the reference
-    unmatched: int = 0  # people whose box overlaps none of the other's by SAME_PERSON_IOU, of either
+    people: int = 0  # people of the reference
+    unmatched: int = 0  # people of either without a box of the other that overlaps by SAME_PERSON_IOU
     pixels: int = 0
     equal: int = 0
-    person_pixels: int = 0  # painted in either
+    person_pixels: int = 0  # pixels labelled in either
     person_equal: int = 0
     worst_picture: float = 1.0  # the smallest fraction of equal pixels
-    box_px: float = 0.0  # largest difference of a coordinate of a matched box, pixels of the image
+    box_px: float = 0.0  # largest difference of a coordinate of a matched box, image pixels
 
     @property
     def fraction(self) -> float:
-        """Pixels with the same part (background counts), of all."""
+        """Returns the fraction of pixels with the same part, background included."""
         return self.equal / self.pixels
 
     @property
     def person_fraction(self) -> float:
-        """The same of those that are a person in either; 1 if there are none."""
+        """Returns the same fraction among pixels that are a person in either; 1 if there are none."""
         return self.person_equal / self.person_pixels if self.person_pixels else 1.0
 
     def passes(self, bar: float) -> bool:
-        """Enough of all pixels are the same, and each person has a match. The worst image is reported, not barred:
-        one value that float sums of another order push over a rounding step changes an image of small people.
-        """
+        """Returns whether enough pixels are the same and each person has a match. The worst image is reported without a
+        threshold: one rounding step, from float sums in another order, changes an image of small people."""
         return self.fraction >= bar and self.unmatched == 0
 
 
 def read_parts(path: Path) -> np.ndarray:
-    """Part of each pixel, uint8 [H, W], of an `_IUV.png`. Raises ValueError when it cannot be read."""
+    """Reads the part of each pixel, uint8 [H, W], of an `_IUV.png`. Raises ValueError if it cannot be read."""
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise ValueError(f"{path} cannot be read; run maquette densepose again.")
@@ -79,7 +78,7 @@ def read_parts(path: Path) -> np.ndarray:
 
 
 def read_boxes(path: Path) -> np.ndarray:
-    """Boxes of the people, float64 [N, 4], of a result's JSON."""
+    """Reads the boxes of the people, float64 [N, 4], of a JSON result."""
     people = json.loads(path.read_text())["people"]
     return np.array([person["box"] for person in people], np.float64).reshape(-1, 4)
 
@@ -114,7 +113,8 @@ def compare(reference: Path, other: Path) -> Agreement:
 
 
 def compare_boxes(ours: np.ndarray, theirs: np.ndarray, agreement: Agreement) -> None:
-    """Adds the people of one image, boxes [N, 4] and [M, 4], to `agreement`; the most alike are the same person."""
+    """Adds the people of one image, boxes [N, 4] and [M, 4], to `agreement`; the most similar boxes are the same
+    person."""
     iou = box_iou(ours, theirs)
     matched = 0
     while iou.size and iou.max() >= SAME_PERSON_IOU:
@@ -140,7 +140,7 @@ def clip_frames(clip: Path, numbers: Sequence[int], folder: Path) -> list[str]:
 
 
 def run(processor: Processor, bundle: Path, sources: Sequence[str], out: Path) -> None:
-    """Writes the results of the images into `out`, which is emptied first. Raises ValueError with what went wrong."""
+    """Writes the results of the images into `out`, which is emptied first. Raises ValueError with the failure."""
     shutil.rmtree(out, ignore_errors=True)
     settings = ["--bundle", str(bundle), "--out", str(out), "--threads", "1", "--max-frames", str(STUB_FRAMES)]
     run_maquette(processor, ["densepose", *sources, *settings])
@@ -169,7 +169,7 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], bar: float) -
 
 
 def failure_of(found: Agreement | str, bar: float) -> str | None:
-    """What is wrong, as a sentence; None if nothing is."""
+    """Returns the failure as a sentence; None if there is none."""
     if isinstance(found, str):
         return found
     if found.passes(bar):

@@ -1,8 +1,8 @@
-"""Compares the surprise and the likeliest coming frames of this processor with those on others, which qemu emulates.
+"""Compares the novelty scores and the likeliest next frames of this processor with emulated ones (qemu).
 
-Bits of the first frames of a stream, and images that the shipped networks draw at temperature 0, on x86-64 with AVX2
-but without VNNI, and on aarch64 without and with the dot product and matrix instructions. Needs both builds and
-Debian's qemu-user; `make test-isa` makes them and runs this.
+It compares bits of the first frames of a stream, and images that the shipped networks decode at temperature 0, on
+x86-64 with AVX2 but without VNNI, and on aarch64 without and with the dot product and matrix instructions. Needs both
+builds and Debian's qemu-user; `make test-isa` makes them and runs this.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from rich.table import Table
 from benchmarks.processors.emulated import ROOT, Processor, add_arguments, compared, run_maquette, write_junit
 
 SOURCE = "stub:people?count=2&seed=3&size=64x64&frames=8"
-FROM, DRAWN = 5, 2  # the last frame that is seen, and frames that are drawn after it
-CELLS = 16  # of a frame of codes, a side
-MAX_LEVELS = 1  # in which pixels of a cell of equal codes may differ
-BAR = 0.99  # of cells
-MAX_BITS = 0.01  # of the bits of a frame, as a fraction
+FROM, DRAWN = 5, 2  # the last observed frame, and the frames predicted after it
+CELLS = 16  # cells a side of a frame of codes
+MAX_LEVELS = 1  # accepted difference of pixels in cells with equal codes
+BAR = 0.99  # fraction of cells
+MAX_BITS = 0.01  # accepted relative difference of the bits of a frame
 
 
 @dataclass(frozen=True)
 class PredictionAgreement:
-    """How far two folders of results agree."""
+    """Agreement of two folders of results."""
 
-    frames: int  # whose surprise was compared
-    worst_bits: float  # difference by the bits here, of the frame where it is largest
+    frames: int  # frames with compared scores
+    worst_bits: float  # largest difference of a frame's bits, relative to the bits here
     same_events: bool
-    same_cells: float  # fraction of cells that were drawn the same
+    same_cells: float  # fraction of cells with the same codes
 
     def passes(self, bar: float) -> bool:
         return self.same_cells >= bar and self.worst_bits <= MAX_BITS and self.same_events
@@ -48,14 +48,14 @@ def read_surprise(folder: Path) -> list[dict]:
 
 
 def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Of two images uint8 [H, W, 3], whose sides are multiples of CELLS: bool [CELLS, CELLS]."""
+    """Compares two images uint8 [H, W, 3] whose sides are multiples of CELLS: bool [CELLS, CELLS]."""
     worst = np.abs(one.astype(int) - other.astype(int)).max(-1)
     height, width = worst.shape
     return worst.reshape(CELLS, height // CELLS, CELLS, width // CELLS).max((1, 3)) <= MAX_LEVELS
 
 
 def compare(reference: Path, other: Path) -> PredictionAgreement:
-    """Compares two folders of results. Raises ValueError when they are not of the same frames, or of none."""
+    """Compares two folders of results. Raises ValueError if they are not of the same frames, or have none."""
     ours, theirs = read_surprise(reference), read_surprise(other)
     names, others = (sorted(path.name for path in folder.glob("*.png")) for folder in (reference, other))
     if not ours or not names or len(ours) != len(theirs) or names != others:
@@ -69,7 +69,8 @@ def compare(reference: Path, other: Path) -> PredictionAgreement:
 
 
 def run(processor: Processor, bundle: Path, out: Path) -> None:
-    """Writes surprise and drawn frames into `out`, emptied first. Raises ValueError with what went wrong."""
+    """Writes novelty scores and predicted frames into `out`, which is emptied first. Raises ValueError with the
+    failure."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     settings = ["--bundle", str(bundle), "--threads", "1"]
@@ -94,7 +95,7 @@ def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar
 
 
 def failure_of(found: PredictionAgreement | str, bar: float) -> str | None:
-    """What is wrong, as a sentence; None if nothing is."""
+    """Returns the failure as a sentence; None if there is none."""
     if isinstance(found, str) or found.passes(bar):
         return found if isinstance(found, str) else None
     return (

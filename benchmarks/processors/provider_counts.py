@@ -1,4 +1,4 @@
-"""ONNX Runtime's own kernels beside XNNPACK's, in instructions on emulated processors: what would a provider gain?
+"""Compares ONNX Runtime's own kernels with XNNPACK's, in instructions on emulated processors.
 
     python -m benchmarks.processors.provider_counts      graphs of the shipped bundle and of its fp32 twin, on a photo
 
@@ -33,7 +33,7 @@ from export.densepose.graphs import open_bundle
 
 WHEELS = ROOT / ".deps/aarch64-wheels"
 PACKAGES = ("numpy", "onnxruntime", "ai-edge-litert")
-NEEDED = ("backports.strenum", "flatbuffers", "ml_dtypes", "protobuf", "tqdm", "typing-extensions")  # by LiteRT
+NEEDED = ("backports.strenum", "flatbuffers", "ml_dtypes", "protobuf", "tqdm", "typing-extensions")  # kernels in LiteRT
 RUNTIMES = {
     "int8": "ONNX Runtime, int8",
     "signed": "ONNX Runtime, int8 signed",
@@ -44,7 +44,7 @@ RUNTIMES = {
 
 
 def signed(path: Path) -> onnx.ModelProto:
-    """An int8 graph with its activations as signed numbers: zero points are 128 less. The results stay."""
+    """Returns an int8 graph with signed activations: zero points decrease by 128. The results stay."""
     model = onnx.load(path)
     for value in model.graph.initializer:
         if value.data_type == onnx.TensorProto.UINT8:
@@ -54,7 +54,7 @@ def signed(path: Path) -> onnx.ModelProto:
 
 
 def write_networks(folder: Path, int8: Path, fp32: Path, feeds: dict[str, Feed]) -> None:
-    """Each graph for each of RUNTIMES, with its inputs beside it."""
+    """Writes each graph for each of RUNTIMES, with its inputs beside it."""
     from benchmarks import tflite
 
     for name, feed in feeds.items():
@@ -73,7 +73,7 @@ def write_networks(folder: Path, int8: Path, fp32: Path, feeds: dict[str, Feed])
 
 
 def fetch_wheels() -> None:
-    """The runtimes for aarch64 in the versions that are installed here. Raises CalledProcessError."""
+    """Fetches the runtimes for aarch64 in the versions installed here. Raises CalledProcessError."""
     pinned = [f"{package}=={version(package)}" for package in PACKAGES]
     stamp = WHEELS / ".made-of"
     if stamp.exists() and stamp.read_text() == " ".join(pinned):
@@ -86,7 +86,7 @@ def fetch_wheels() -> None:
 
 
 def counted(processor: Processor, networks: Path) -> dict[str, float]:
-    """Millions of instructions of each network. Raises ValueError with what failed."""
+    """Returns millions of instructions of each network. Raises ValueError with the failure."""
     if processor.build == "aarch64":
         python = ["-E", f"PYTHONPATH={WHEELS}", str(SYSROOT / "usr/bin/python3.11")]
     else:
@@ -107,7 +107,8 @@ def counted(processor: Processor, networks: Path) -> dict[str, float]:
 
 
 def lines_of(counts: dict[str, float], names: Sequence[str]) -> list[str]:
-    """A table in Markdown: a line for each runtime, a column for each graph, the sum, and the sum by the shipped's."""
+    """Returns a table in Markdown: a line for each runtime, a column for each graph, the sum, and its ratio to the
+    shipped one."""
     lines = ["| | " + " | ".join(names) + " | all | by the shipped |", "| --- |" + " --- |" * (len(names) + 2)]
     rows = {runtime: [] for runtime in RUNTIMES}
     for path, value in counts.items():

@@ -3,7 +3,7 @@
     python -m benchmarks --only cameras              about 3 minutes; `make build` first
     python -m benchmarks --only cameras --no-guest   without the virtual machine
 
-Measured by `maquette play` in two places. The guest is a real kernel with its drivers in a virtual machine
+`maquette play` runs on two machines. The guest is a real kernel with its drivers in a virtual machine
 (tests/camera_vm, guest "metrics"), with the kernel's test camera and a virtual USB camera; its clock counts
 instructions, so that its times come out alike however busy this machine is. The host is this machine, with a stub and a
 recording replayed as cameras.

@@ -80,14 +80,14 @@ def measure(pictures: Pictures, bundle: Path, table: object, threshold: float, t
         backend = Replay(column, "int8", bundle, threshold)
         row = {"setting": column.setting.name, "axis": column.setting.axis}
         row["ms"] = round(statistics.median(column.ms), 3)
-        row["rendered"] = rendered_figures(backend, pictures.rendered, table)
-        row["photographs"] = photograph_figures(backend, pictures.photographs, photographs)
-        row["views"] = view_figures(backend, pictures, moments)
+        row["rendered"] = rendered_metrics(backend, pictures.rendered, table)
+        row["photographs"] = photograph_metrics(backend, pictures.photographs, photographs)
+        row["views"] = view_metrics(backend, pictures, moments)
         rows.append(plain(row))
     return rows
 
 
-def rendered_figures(backend: Replay, images: list[LabelledImage], table: object) -> dict[str, float] | None:
+def rendered_metrics(backend: Replay, images: list[LabelledImage], table: object) -> dict[str, float] | None:
     if not images:
         return None
     tally = Tally(backend.threshold)
@@ -97,7 +97,7 @@ def rendered_figures(backend: Replay, images: list[LabelledImage], table: object
     return {"part": found.part_accuracy, "mask": found.mask_iou, "side": found.left_right, "gps": found.ap_gps}
 
 
-def photograph_figures(backend: Replay, chosen: PhotoSet, images: list[np.ndarray]) -> dict[str, float] | None:
+def photograph_metrics(backend: Replay, chosen: PhotoSet, images: list[np.ndarray]) -> dict[str, float] | None:
     if not images:
         return None
     tally = photos.Tally(backend.threshold)
@@ -108,7 +108,7 @@ def photograph_figures(backend: Replay, chosen: PhotoSet, images: list[np.ndarra
             "side": found.left_right}  # fmt: skip
 
 
-def view_figures(backend: Replay, pictures: Pictures, images: list[np.ndarray]) -> dict[str, float] | None:
+def view_metrics(backend: Replay, pictures: Pictures, images: list[np.ndarray]) -> dict[str, float] | None:
     if not images:
         return None
     answers = iter([backend.predict(image) for image in images])

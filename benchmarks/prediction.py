@@ -42,7 +42,7 @@ SIZE_PX, LARGE_PX = (320, 240), (640, 480)
 FRAMES = 90  # frames of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
 METRICS = (
-    "prediction_pictures_a_second", "concealed_wait_p99_ms", "novelty_frames_a_second", *concealment.METRICS,
+    "prediction_frames_a_second", "concealed_wait_p99_ms", "novelty_frames_a_second", *concealment.METRICS,
     *sampling.METRICS,
 )  # fmt: skip
 METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto", "network": "auto, refined"}
@@ -86,17 +86,17 @@ def measure(
     if pushing:
         paths = sorted(clips.glob("clip-*.npz"))[: 3 if quick else 24]
         document["motion_error_px"] = motion_error.measure(paths)
-    surprise = frames_a_second(BUNDLE, threads, 60 if quick else 200)
-    document["novelty"] = surprise
+    novelty = frames_a_second(BUNDLE, threads, 60 if quick else 200)
+    document["novelty"] = novelty
     metrics = {
         "concealed_wait_p99_ms": waits["wait_ms"]["p99"],
-        "novelty_frames_a_second": surprise["frames_a_second"],
+        "novelty_frames_a_second": novelty["frames_a_second"],
     }
     missing = {}
     if speed:
-        metrics["prediction_pictures_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
+        metrics["prediction_frames_a_second"] = 1000 / (speed[-1]["push_ms"] + speed[-1]["predict_ms"])
     else:
-        missing["prediction_pictures_a_second"] = "; ".join(absent)
+        missing["prediction_frames_a_second"] = "; ".join(absent)
     bridged = concealment.measure(films, threads)
     document["concealment"] = {name: rows.tolist() for name, rows in bridged.items()}
     if bridged:
@@ -117,7 +117,7 @@ def measure_sampling(quick: bool, folder: Path, threads: int) -> tuple[dict, dic
 
     data, kind = folder.parent.parent, folder.parent.name
     clips = measure.clips_of(data, kind, 2 if quick else None)
-    document, metrics = measure.measure_pictures(clips, measure.real_clips(data, kind, len(clips)), BUNDLE)
+    document, metrics = measure.measure_images(clips, measure.real_clips(data, kind, len(clips)), BUNDLE)
     document["times_ms"], of_times = measure.measure_times(clips, BUNDLE, threads)
     return document, metrics | of_times
 
@@ -202,13 +202,13 @@ def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
 def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
     """Measures novelty scores of a simulated camera of 640 x 480: median wall-clock time, processor time, and
     stages."""
-    surprise = maquette.Surprise(bundle_path=bundle, threads=threads)
+    novelty = maquette.Surprise(bundle_path=bundle, threads=threads)
     stats, used_ms = [], []
     for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
         begin = time.process_time()
-        surprise.push(frame)
+        novelty.push(frame)
         used_ms.append(1000 * (time.process_time() - begin))
-        stats.append(surprise.stats)
+        stats.append(novelty.stats)
     of = {name: float(np.median([one[name] for one in stats[5:]])) for name in stats[0] if name.endswith("_ms")}
     return {"frames_a_second": 1000 / of["push_ms"], "cpu_ms": float(np.median(used_ms[5:])), **of}
 
@@ -265,18 +265,18 @@ def section(measured: dict) -> tuple[str, list]:
     """Returns the title and the parts of the section, from a document of `measure`."""
     waits = measured["waits"]
     parts: list = [
-        "What a predictor makes of a stream 1, 3, 5 and 8 frames after it saw its latest: PSNR in dB (320 x 240). "
-        "Motion: ours; OpenCV DIS: constant velocity by its preset medium; auto: what an app gets without an option; "
-        "mended: that changed by a network (MAQ_PREDICTION_NETWORK).",
-        table_of([], measured["sets"]) if measured["sets"] else "No clip was there.",
+        "Frames predicted 1, 3, 5 and 8 frames after the latest frame: PSNR in dB (320 x 240). Motion: our optical "
+        "flow. OpenCV DIS: constant velocity by its preset medium. auto: the default of an app. Refined: auto changed "
+        "by a network (MAQ_PREDICTION_NETWORK).",
+        table_of([], measured["sets"]) if measured["sets"] else "There were no clips.",
     ]
     structure = ssim_table(measured["sets"])
     parts += [structure] if len(structure) > 1 else []
     errors = measured.get("motion_error_px", {})  # an older document has none
     if "motion" in errors:
         parts.append(
-            f"Motion from frame to frame of {errors['clips']} of pushing, where things move (by "
-            f"{motion_error.MIN_MOTION_PX} pixels and more) and stay visible: endpoint error in pixels of 320 x 240, "
+            f"Motion from frame to frame of {errors['clips']} clips of pushing, where objects move (by "
+            f"{motion_error.MIN_MOTION_PX} pixels and more) and stay visible. Endpoint error in pixels of 320 x 240, "
             "mean and median of a clip: "
             + ", ".join(f"{says} {errors[name][0]:.2f} and {errors[name][1]:.2f}"
                         for name, says in motion_error.METHODS.items())
@@ -288,8 +288,8 @@ def section(measured: dict) -> tuple[str, list]:
             "threads",
             "frame pushed",
             "with auto",
-            "image made",
-            "images a second",
+            "frame predicted",
+            "frames a second",
             "CPU time",
             "DIS, its threads",
         ]
@@ -302,21 +302,20 @@ def section(measured: dict) -> tuple[str, list]:
         )
     parts += [rows] if measured["speed"] else []
     parts.append(
-        f"A camera of 640 x 480 at 30 frames a second that drops a quarter of them, concealed: {waits['captured']} "
-        f"frames captured, {waits['predicted']} predicted, there {waits['wait_ms']['median']:.2f} ms (median), "
-        f"{waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
+        "A concealer for a camera of 640 x 480 at 30 frames a second that drops a quarter of its frames: "
+        f"{waits['captured']} frames captured, {waits['predicted']} predicted, ready "
+        f"{waits['wait_ms']['median']:.2f} ms (median), {waits['wait_ms']['p99']:.2f} ms (p99) after they were due."
     )
     if measured.get("concealment"):  # an older document has none
         parts.append(
-            "Gaps of up to 300 ms bridged, PSNR in dB over their frames: the last frame repeated / what is predicted."
+            "Concealed gaps of up to 300 ms, PSNR in dB over their frames: last frame repeated / predicted frames."
         )
         parts.append(concealment.table_of({name: np.array(rows) for name, rows in measured["concealment"].items()}))
-    surprise = measured["novelty"]
+    novelty = measured["novelty"]
     parts.append(
-        f"Surprise with its map, frames of 640 x 480: {surprise['frames_a_second']:.0f} a second, "
-        f"{surprise['cpu_ms']:.1f} ms of processor time a frame (squeezing {surprise['resize_ms']:.1f}, network "
-        f"{surprise['network_ms']:.1f}, nearest entries {surprise['nearest_ms']:.1f} ms). How well it finds events: "
-        "`python -m benchmarks.surprise`."
+        f"Novelty score with its map, frames of 640 x 480: {novelty['frames_a_second']:.0f} a second, "
+        f"{novelty['cpu_ms']:.1f} ms of processor time a frame (resizing {novelty['resize_ms']:.1f}, network "
+        f"{novelty['network_ms']:.1f}, nearest codebook entries {novelty['nearest_ms']:.1f} ms)."
     )
     if measured.get("sampling"):
         parts += sampling_tables(measured["sampling"])

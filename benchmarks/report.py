@@ -12,9 +12,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from benchmarks import camera_section, frame_budget, person_sizes, prediction, provenance, startup, ui_latency
-from benchmarks.edges import plots as edge_pictures
+from benchmarks.edges import plots as edge_plots
 from benchmarks.edges import section as edge_section
-from benchmarks.scenes import plots as scene_pictures
+from benchmarks.scenes import plots as scene_plots
 from benchmarks.scenes import section as scene_section
 from benchmarks.sweep import pareto
 
@@ -34,9 +34,9 @@ def write(document: dict, folder: Path) -> list[Path]:
             plt.close(figure)
             written.append(folder / name)
     if "scenes" in document:
-        written += scene_pictures.write(document["scenes"], folder)
+        written += scene_plots.write(document["scenes"], folder)
     if "edges" in document:
-        written += edge_pictures.write(document["edges"], folder)
+        written += edge_plots.write(document["edges"], folder)
     sections = text_sections(document)
     (folder / "report.md").write_text(markdown(sections))
     (folder / "index.html").write_text(page(sections, folder))
@@ -50,7 +50,7 @@ def error_against_time(document: dict) -> plt.Figure:
     for axis, key, label in ((axes[0], "error", "1 - AP by GPS"), (axes[1], "error_cm", "median surface error, cm")):
         front = pareto([(row["ms"], row[key]) for row in rows])
         axis.plot([rows[k]["ms"] for k in front], [rows[k][key] for k in front], color="0.7", zorder=0,
-                  label="no other is faster and better")  # fmt: skip
+                  label="Pareto front")  # fmt: skip
         for kind, colour in COLOURS.items():
             chosen = [row for row in rows if row["axis"] == kind]
             if chosen:
@@ -134,11 +134,11 @@ Section = tuple[str, list]  # the title, then texts, images as (name, caption), 
 
 def text_sections(document: dict) -> list[Section]:
     intro = (
-        "Maquette finds people in a camera's images and maps each of their pixels to a body surface, on two "
-        "processor cores. This page says what that costs here, and what each setting trades."
+        "Maquette finds people in camera images, maps each of their pixels to a body surface, measures edges, builds "
+        "scenes and heads, and predicts frames, on two processor cores. This page has its speed, size and error."
     )
     sections = [
-        ("Maquette: how fast, how large, how exact", [intro, *circumstances(document)]),
+        ("Maquette: speed, size and error", [intro, *circumstances(document)]),
         targets_section(document),
     ]
     for name, section in SECTIONS.items():
@@ -155,10 +155,10 @@ def sweep_section(sweep: list[dict]) -> Section:
         metrics.append(f"{row['part_accuracy']:.3f}")
         rows.append([row["setting"], *metrics, "●" if k in front else ""])
     return "Error against run time", [
-        ("error-against-run-time.png", "Each point is a setting, named where no other is both faster and better."),
+        ("error-against-run-time.png", "Each point is a setting; settings on the Pareto front are named."),
         "Rendered people that no training saw; all settings measured alternately on the same images. AP by GPS: "
         "average precision by geodesic point similarity (1 is perfect). With key frames the image moves by 1 % of "
-        "its width a frame; the error is that of the last frame before the next key frame.",
+        "its width a frame; the error is measured on the last frame before the next key frame.",
         rows,
     ]
 
@@ -172,10 +172,10 @@ def frames_section(frames: dict) -> Section:
             rows.append([label, f"{case['people']:.1f}", *(f"{ms[p]:.1f}" for p in ("p50", "p90", "p99")),
                          f"{case['fps']:.0f}", f"{case['cpu_ms']:.1f}"])  # fmt: skip
     return "Time of a frame", [
-        ("scaling.png", "Time against people in view, pixels of the source, and the network's input."),
-        ("stages.png", "Where the time goes."),
-        "From asking the source for an image to having the result; walking people of the stub source. "
-        "CPU ms: CPU time of all threads for a frame, a measure of its energy on every machine.",
+        ("scaling.png", "Time against people in view, pixels of the source, and size of the network's input."),
+        ("stages.png", "Time of each stage."),
+        "Time from the request of an image to the result; walking people of the stub source. CPU ms: CPU time of all "
+        "threads for a frame, a measure of its energy on every machine.",
         rows,
     ]
 
@@ -200,17 +200,18 @@ def runtimes_section(measured: dict) -> Section:
         rows,
         f"Roofline: this machine reached {line['float32_macs_s'] / 1e9:.0f} billion float32 and "
         f"{line['int8_macs_s'] / 1e9:.0f} billion int8 multiply-adds a second in large matrix products, and copied "
-        f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The minimum time is that of each layer by its numbers' "
-        f"rate or its bytes, whichever is larger; the networks reach {line['fraction']:.0%} of it.",
+        f"{line['bytes_s'] / 1e9:.0f} GB/s within its caches. The minimum time of a layer follows from its "
+        f"multiply-adds or its bytes, whichever takes longer; the networks reach {line['fraction']:.0%} of the sum.",
         line_rows,
     ]
 
 
 def agreement_section(agreement: dict) -> Section:
     return "int8 against fp32", [
-        f"Of the pixels that are a person's in fp32, {agreement['labels']:.1%} have the same part in int8; of those "
-        f"that are a person's in both, {agreement['parts']:.1%}. The outlines agree by {agreement['mask_iou']:.1%} "
-        f"(IoU), {agreement['same_count']:.0%} of {agreement['images']} images show as many people."
+        f"{agreement['labels']:.1%} of the person pixels of fp32 have the same part in int8, and "
+        f"{agreement['parts']:.1%} of the pixels that are a person in both. The silhouettes have an IoU of "
+        f"{agreement['mask_iou']:.1%}; {agreement['same_count']:.0%} of {agreement['images']} images have the same "
+        "number of people."
     ]
 
 

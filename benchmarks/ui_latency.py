@@ -1,10 +1,10 @@
 """Measures waits of a user of an app with a window: until a live source or a scene is shown, and in the window's
 thread.
 
-    python -m benchmarks --only window    about a minute; `make bench` builds what is needed
+    python -m benchmarks --only ui_latency about a minute; `make bench` builds what is needed
 
-Live sources and scenes by small programs over the app library (benchmarks/native/measure_live_*.cpp); the window by the
-desktop demo on a display in memory, where both are there.
+Small programs of the app library measure live sources and scenes (benchmarks/native/measure_live_*.cpp). The desktop
+demo on a display in memory measures the window, if both are installed.
 """
 
 from __future__ import annotations

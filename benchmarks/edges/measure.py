@@ -232,7 +232,7 @@ def measure_curves(given: Sources, _: Networks, folder: Path, threads: int, quic
     metrics, missing = curves.metrics_from(of_solids, boxes)
     metrics |= true_fields.metrics_from(of_true)
     metrics |= fused.metrics_from(of_fusion) | carton.metrics_from(of_carton)
-    missing |= dict.fromkeys(carton.METRICS, why_no_carton or "too little of the carton was found")
+    missing |= dict.fromkeys(carton.METRICS, why_no_carton or "too few edges of the real box were found")
     missing |= dict.fromkeys(fused.METRICS, why_no_fusion or "no solid could be made")
     missing[true_fields.METRIC] = why_no_true
     return Found(document, metrics, missing)

@@ -23,13 +23,13 @@ SHEET = "edges-sheet.jpg"
 
 def write(measured: dict, folder: Path) -> list[Path]:
     """Writes the images of the measured values into `folder`; the contact sheet exists already."""
-    drawn: dict[str, Callable[[dict], plt.Figure]] = {}
+    plots: dict[str, Callable[[dict], plt.Figure]] = {}
     if "speed" in measured:
-        drawn["edges-error-against-run-time.png"] = error_against_time
+        plots["edges-error-against-run-time.png"] = error_against_time
     if measured.get("groups"):
-        drawn["edges-groups.png"] = groups
+        plots["edges-groups.png"] = groups
     written = []
-    for name, draw in drawn.items():
+    for name, draw in plots.items():
         figure = draw(measured)
         figure.savefig(folder / name, dpi=110, bbox_inches="tight")
         plt.close(figure)
@@ -47,7 +47,7 @@ def error_against_time(measured: dict) -> plt.Figure:
     figure, axis = plt.subplots(figsize=(10, 6))
     front = front_of(rows)
     axis.plot([row["ms"] for row in front], [row["rmse_r"] for row in front], color="0.7", zorder=0,
-              label="no other is faster and better")  # fmt: skip
+              label="Pareto front")  # fmt: skip
     for kind, colour in COLOURS.items():
         chosen = [row for row in rows if row["axis"] == kind]
         if chosen:

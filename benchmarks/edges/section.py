@@ -12,7 +12,7 @@ COLUMNS = {"rmse_r": ("RMSE, r", 1, ".2f"), "rmse_near_r": ("near edges, r", 1, 
            "recall_1r": ("recall at r, %", 100, ".1f"), "fpr_1r": ("false, %", 100, ".2f"),
            "recall_4r": ("at 4 r, %", 100, ".1f"), "fpr_4r": ("false, %", 100, ".2f")}  # fmt: skip
 ANCHORS = [
-    ["another data set, second-hand", "RMSE, r", "recall, %", "false, %"],
+    ["another data set, published values", "RMSE, r", "recall, %", "false, %"],
     ["DEF (78.6 M parameters), clean synthetic patches, at r", "0.56", "80.0", "0.02"],
     ["Voronoi covariance (VCM), the same patches, at r", "", "about 40", "about 5"],
     ["DEF, real scans by structured light, at 4 r", "3", "91.7", ""],
@@ -44,16 +44,16 @@ def section(measured: dict) -> tuple[str, list]:
 def error_parts(measured: dict) -> list:
     views = measured["views"]
     parts: list = [
-        "How far each pixel of a depth frame is from the nearest sharp feature curve, in r = depth / focal length: on "
+        "Distance of each pixel of a depth frame to the nearest sharp curve, in r = depth / focal length. Data: "
         f"{views['test']} views (320 x 240) of {views['solids']} rendered solids whose families neither training nor "
-        f"the choice of thresholds saw. Thresholds of all ways are chosen on {views['val']} validation views.",
+        f"the choice of thresholds saw. Thresholds of all methods are chosen on {views['val']} validation views.",
         error_rows(measured["errors"]),
-        "Means over views of each view's figure. Near edges: pixels within 4 r of one. A pixel is called sharp where "
-        "its distance is below a threshold, so chosen that at most 0.5 % (for r) or 2 % (for 4 r) of the validation "
-        "pixels that are farther than r or 4 r from an edge are called sharp. Recall: of the test pixels nearer than "
-        "r or 4 r, those called sharp; false: of the others, those called sharp. Ways without a network find edges "
-        "with thresholds of the smallest RMSE; what is nearer to these than r or 4 r is called sharp. Time: the "
-        "library's own for our networks; of the ways without a network, Python's and OpenCV's.",
+        "Values are means over views. Near edges: pixels within 4 r of an edge. A pixel counts as sharp if its "
+        "distance is below a threshold. The threshold allows false positives on 0.5 % (for r) or 2 % (for 4 r) of the "
+        "validation pixels that are farther from an edge. Recall: fraction of sharp pixels among test pixels nearer "
+        "than r or 4 r; false: fraction among the others. Baselines use the thresholds with the smallest RMSE; pixels "
+        "nearer than r or 4 r to their edges count as sharp. Time: the library for our networks; Python and OpenCV "
+        "for baselines.",
         ANCHORS,
         *sheet_parts(measured["sheet"]),
     ]
@@ -121,7 +121,7 @@ def group_parts(rows: list[dict]) -> list:
     order = list(dict.fromkeys(row["axis"] for row in rows))
     for row in sorted(rows, key=lambda row: order.index(row["axis"])):
         table.append([row["axis"], row["group"], row["level"], f"{row['pixels']:,}", *cells(row)])
-    return [("edges-groups.png", "The shipped network by what is particular about pixels."), table]
+    return [("edges-groups.png", "The shipped network by group of pixels."), table]
 
 
 def speed_parts(rows: list[dict]) -> list:
@@ -176,7 +176,7 @@ def curve_parts(measured: dict) -> list:
         solids.append([f"true field, {SAYS[row['level']]}", str(row["views"]), *curve_cells(row), ""])
     for row in measured["curves"]:
         solids.append([f"{SAYS[row['level']]}: {row['way']}", str(row["views"]), *curve_cells(row), f"{row['ms']:.2f}"])
-    boxes = [["carton of 15 to 60 cm at 1.2 to 1.6 m", "frames", "with a box, %", "error of a side, mm (median)", "p90",
+    boxes = [["box of 15 to 60 cm at 1.2 to 1.6 m", "frames", "with a box, %", "error of a side, mm (median)", "p90",
               "standard deviation while the camera turns, mm", "frames with a box"]]  # fmt: skip
     for row in measured["boxes"]:
         mm = ["" if row[key] is None else f"{row[key]:.1f}" for key in ("median_mm", "p90_mm", "deviation_mm")]
@@ -188,6 +188,6 @@ def curve_parts(measured: dict) -> list:
         "one, means over views. Roundings that are neither sharp nor smooth count neither for nor against. Distances "
         "end at 100 r.",
         boxes,
-        "The largest box of a frame with the sides of the true carton, both by size; frames without a box have no "
+        "The largest box of a frame with the sides of the true box, both sorted by size; frames without a box have no "
         "error and are in the percentage alone.",
     ]

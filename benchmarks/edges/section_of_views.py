@@ -12,7 +12,7 @@ SAYS = {"clean": "exact depth", "tof": "time of flight", "stereo": "stereo (0.08
 def carton_parts(found: dict | None) -> list:
     if found is None:
         return []
-    table = [["real carton, depth from 42 photos, fused: edge", "found of it, %", "off, px (median)"]]
+    table = [["real box, depth from 42 photos, fused: edge", "found of it, %", "off, px (median)"]]
     for row in found["edges"]:
         off = "" if row["median_px"] is None else f"{row['median_px']:.1f}"
         table.append([row["edge"], f"{100 * row['part']:.0f}", off])
@@ -24,7 +24,7 @@ def carton_parts(found: dict | None) -> list:
         table,
         f"{found['found']} of 12 edges have a curve within 3 px along half of their length "
         f"({found['curves']} curves in all); {angles}. A to D are the corners in front, clockwise from above on the "
-        "left, E to H those behind them. Corners were marked by hand in three photos; the photos show nine edges.",
+        "left; E to H are the corners behind them. Corners were marked by hand in three photos, which show nine edges.",
     ]
 
 
@@ -48,18 +48,18 @@ def fusion_time_parts(timed: dict | None) -> list:
 def fusion_error_parts(found: dict | None) -> list:
     if found is None:
         return []
-    errors = [["fused views, 320 x 240", "one view, RMSE, r", f"{fused.VIEWS} fused, r", "by it"]]
+    errors = [["fused views, 320 x 240", "one view, RMSE, r", f"{fused.VIEWS} fused, r", "ratio"]]
     for row in found["errors"]:
         errors.append([SAYS[row["level"]], f"{row['one_r']:.2f}", f"{row['fused_r']:.2f}", f"{row['ratio']:.2f}"])
     says = [
-        f"Pixels of solids of `val`, each seen from {fused.VIEWS} places, against the nearest "
-        "sharp curve that any of the views sees; a fused point stands for the pixels that it was made of, and all "
-        "distances are cut where its own ends, 16 footprints of the view that was nearest to it."
+        f"Pixels of solids of `val`, seen from {fused.VIEWS} cameras, against the nearest sharp curve that any view "
+        "sees. A fused point stands for its pixels. All distances are clipped at the limit of the point, 16 footprints "
+        "of its nearest view."
     ]
     if found["memory"]:
         says.append(
             f"{found['memory']['points']:,} points of {fused.TIMED_VIEWS} views of 640 x 480 added "
-            f"{found['memory']['memory_mb']:.0f} MB to the peak of a process whose network had run before."
+            f"{found['memory']['memory_mb']:.0f} MB to the peak of a process after its network had run."
         )
     if found["missing"]:
         says.append(f"Left out: {'; '.join(found['missing'])}.")
@@ -78,4 +78,7 @@ def round_parts(found: dict | None) -> list:
         table.append(
             [row["name"], f"{row['pixels']:,}", f"{100 * row['under_1r']:.2f}", f"{100 * row['under_4r']:.1f}"]
         )
-    return [table, "Real scans without an edge, 17 px and more from their borders: what is found there is wrong."]
+    return [
+        table,
+        "Pixels of real scans without an edge, at least 17 px from their borders; each edge there is a false positive.",
+    ]

@@ -86,7 +86,7 @@ def measure(
     """Returns rows of every setting and baseline on frames of FULL_PX: median milliseconds, and RMSE in r of the full
     frame, by level and their mean. baselines: by level."""
     wanted = settings(list(bundles))
-    rival_rows = [Setting(name, "without a network", "") for name in next(iter(baselines.values()), {})]
+    baseline_rows = [Setting(name, "without a network", "") for name in next(iter(baselines.values()), {})]
     with ExitStack() as stack:
         ways = {}
         for setting in wanted:
@@ -97,7 +97,7 @@ def measure(
             for level in LEVELS:
                 depth = view.seen(level)
                 counts = view.frame.counts & (depth > 0)
-                for setting in [*wanted, *rival_rows]:
+                for setting in [*wanted, *baseline_rows]:
                     if setting.bundle:
                         way: Method = _Library(ways[setting.bundle, *setting.options.items()])
                     else:
@@ -107,7 +107,7 @@ def measure(
                         setting.ms.append(ms)
                         setting.metrics[level].append(of_pixels(distance, view, counts))
     rows = []
-    for setting in [*wanted, *rival_rows]:
+    for setting in [*wanted, *baseline_rows]:
         rmse = {level: float(np.nanmean([f["rmse_r"] for f in found])) for level, found in setting.metrics.items()}
         rows.append({"setting": setting.name, "axis": setting.axis, "width_px": setting.width_px,
                      "ms": round(statistics.median(setting.ms), 3), "ms_p90": round(_p90(setting.ms), 3),
@@ -137,7 +137,7 @@ def measure_savings(bundle: Path, threads: int, frames: int) -> list[dict]:
         with_option = {name: stack.enter_context(Edges(bundle, threads, **o)) for name, o in OPTIONS.items()}
         for scene in tqdm(SCENES, desc="edges: savings", unit="scene", disable=None):
             for noise in NOISES:
-                tally = {name: {"without": [], "with": [], "rms": [], "side": [], "share": []} for name in OPTIONS}
+                tally = {name: {"without": [], "with": [], "rms": [], "side": [], "fraction": []} for name in OPTIONS}
                 uri = f"stub:solids?scene={scene}&noise={noise}&size={SMALL_PX[0]}x{SMALL_PX[1]}"
                 for number, (depth, camera) in enumerate(depth_frames(uri, frames + 1)):
                     for name, saving in with_option.items():
@@ -149,12 +149,12 @@ def measure_savings(bundle: Path, threads: int, frames: int) -> list[dict]:
                         own["with"].append(other.stats.total_ms)
                         own["rms"].append(float(np.sqrt(np.mean((ours.distance - other.distance)[known] ** 2))))
                         own["side"].append(float(((ours.distance < 1) != (other.distance < 1))[known].mean()))
-                        own["share"].append(other.stats.network_pixel_count / max(ours.stats.network_pixel_count, 1))
+                        own["fraction"].append(other.stats.network_pixel_count / max(ours.stats.network_pixel_count, 1))
                 for name, own in tally.items():
                     rows.append({"scene": scene, "noise": noise, "option": name,
                                  "ms_without": statistics.median(own["without"]), "ms": statistics.median(own["with"]),
                                  "difference_r": float(np.mean(own["rms"])), "other_side": float(np.mean(own["side"])),
-                                 "network_fraction": float(np.mean(own["share"]))})  # fmt: skip
+                                 "network_fraction": float(np.mean(own["fraction"]))})  # fmt: skip
     return rows
 
 

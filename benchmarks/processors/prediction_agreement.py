@@ -43,7 +43,7 @@ class PredictionAgreement:
         return self.same_cells >= bar and self.worst_bits <= MAX_BITS and self.same_events
 
 
-def read_surprise(folder: Path) -> list[dict]:
+def read_novelty(folder: Path) -> list[dict]:
     return [json.loads(line) for line in (folder / "surprise.json").read_text().splitlines()]
 
 
@@ -56,7 +56,7 @@ def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def compare(reference: Path, other: Path) -> PredictionAgreement:
     """Compares two folders of results. Raises ValueError if they are not of the same frames, or have none."""
-    ours, theirs = read_surprise(reference), read_surprise(other)
+    ours, theirs = read_novelty(reference), read_novelty(other)
     names, others = (sorted(path.name for path in folder.glob("*.png")) for folder in (reference, other))
     if not ours or not names or len(ours) != len(theirs) or names != others:
         raise ValueError(
@@ -82,7 +82,7 @@ def run(processor: Processor, bundle: Path, out: Path) -> None:
 def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar: float) -> None:
     table = Table(title=f"Prediction by {bundle.name} against that on this processor", title_justify="left")
     table.add_column("processor", no_wrap=True)
-    for column in ("frames", "bits, worst, %", "events", "cells drawn alike, %", "bar"):
+    for column in ("frames", "bits, worst, %", "events", "equal cells, %", "bar"):
         table.add_column(column, justify="right")
     for name, found in results.items():
         if isinstance(found, str):
@@ -99,7 +99,7 @@ def failure_of(found: PredictionAgreement | str, bar: float) -> str | None:
     if isinstance(found, str) or found.passes(bar):
         return found if isinstance(found, str) else None
     return (
-        f"{100 * found.same_cells:.2f} % of the cells are drawn alike, where {100 * bar:g} % are asked for; bits "
+        f"{100 * found.same_cells:.2f} % of the cells are equal; at least {100 * bar:g} % are required; bits "
         f"differ by up to {100 * found.worst_bits:.3f} %, where {100 * MAX_BITS:g} % are allowed; events are "
         f"{'the same' if found.same_events else 'others'}."
     )
@@ -112,9 +112,7 @@ def main(argv: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--bundle", type=Path, default=ROOT / "sdk/models/prediction-int8")
-    parser.add_argument(
-        "--bar", type=float, default=BAR, help="min. fraction of cells that are drawn alike (default %(default)s)"
-    )
+    parser.add_argument("--bar", type=float, default=BAR, help="min. fraction of equal cells (default %(default)s)")
     add_arguments(parser, ROOT / "build/prediction-agreement")
     options = parser.parse_args(argv)
     try:

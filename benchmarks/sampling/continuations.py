@@ -28,7 +28,7 @@ def shown(predictor: maquette.Predictor, frames: np.ndarray, step_s: float) -> N
         predictor.push(np.ascontiguousarray(frame), k * step_s)
 
 
-def foreseen(name: str, **settings: object) -> Method:
+def predicted(name: str, **settings: object) -> Method:
     """Returns a method that does not sample."""
     predictor = maquette.Predictor(method=name, threads=1, **settings)
 
@@ -39,7 +39,7 @@ def foreseen(name: str, **settings: object) -> Method:
     return go_on
 
 
-def drawn(samples: int, bundle: Path, **settings: float) -> Method:
+def sampled(samples: int, bundle: Path, **settings: float) -> Method:
     """Returns a sampling method. settings: temperature, top_k, passes."""
     predictor = maquette.Predictor(
         method="network", network_mode=DRAWN, bundle_path=bundle, threads=1, seed=SEED, **settings
@@ -50,36 +50,36 @@ def drawn(samples: int, bundle: Path, **settings: float) -> Method:
         predictor.draw(samples, MADE, step_s)
         numbers = range(1, MADE + 1)
         # One time after another, so that the work that all samples share is done once.
-        pictures = np.stack([[predictor.drawn(s, k).pixels() for s in range(samples)] for k in numbers], 1)
-        return pictures, np.stack([[predictor.uncertainty(s, k) for k in numbers] for s in range(samples)])
+        images = np.stack([[predictor.drawn(s, k).pixels() for s in range(samples)] for k in numbers], 1)
+        return images, np.stack([[predictor.uncertainty(s, k) for k in numbers] for s in range(samples)])
 
     return go_on
 
 
 def methods(bundle: Path, samples: int) -> dict[str, Method]:
     return {
-        "last frame": foreseen("last"),
-        "motion": foreseen("motion"),
-        "auto": foreseen("auto"),
-        "auto, refined": foreseen("network", network_mode=MENDED, bundle_path=bundle),
-        "likeliest": drawn(1, bundle, temperature=0),
-        "likeliest, 1 pass": drawn(1, bundle, temperature=0, passes=1),
-        **{f"likeliest, {passes} passes": drawn(1, bundle, temperature=0, passes=passes) for passes in PASSES},
-        **{f"temperature {value:g}": drawn(4, bundle, temperature=value) for value in TEMPERATURES},
-        "temperature 1": drawn(samples, bundle, temperature=1),
+        "last frame": predicted("last"),
+        "motion": predicted("motion"),
+        "auto": predicted("auto"),
+        "auto, refined": predicted("network", network_mode=MENDED, bundle_path=bundle),
+        "likeliest": sampled(1, bundle, temperature=0),
+        "likeliest, 1 pass": sampled(1, bundle, temperature=0, passes=1),
+        **{f"likeliest, {passes} passes": sampled(1, bundle, temperature=0, passes=passes) for passes in PASSES},
+        **{f"temperature {value:g}": sampled(4, bundle, temperature=value) for value in TEMPERATURES},
+        "temperature 1": sampled(samples, bundle, temperature=1),
     }
 
 
-def went_on(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def continued(clips: Clips, bundle: Path, samples: int) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Returns by method: images uint8 [clips, samples, MADE, H, W, 3], and bits of cells [clips, samples, MADE, 16, 16]
     if the method has them."""
-    pictures: dict[str, list[np.ndarray]] = {}
+    images: dict[str, list[np.ndarray]] = {}
     bits: dict[str, list[np.ndarray]] = {}
     known = methods(bundle, samples)
     for frames, fps in tqdm(zip(clips.frames.numpy(), clips.fps.numpy(), strict=True), total=len(clips), disable=None):
         for name, go_on in known.items():
             made, uncertain = go_on(frames[:GIVEN], 1 / float(fps))
-            pictures.setdefault(name, []).append(made)
+            images.setdefault(name, []).append(made)
             if uncertain is not None:
                 bits.setdefault(name, []).append(uncertain)
-    return {k: np.stack(v) for k, v in pictures.items()}, {k: np.stack(v) for k, v in bits.items()}
+    return {k: np.stack(v) for k, v in images.items()}, {k: np.stack(v) for k, v in bits.items()}

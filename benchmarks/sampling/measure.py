@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from benchmarks.sampling import frechet, times, uncertainty
-from benchmarks.sampling.continuations import GIVEN, MADE, SAMPLES, went_on
+from benchmarks.sampling.continuations import GIVEN, MADE, SAMPLES, continued
 from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
 from export.prediction.pictures.picture_error import psnr_db
@@ -17,25 +17,25 @@ AHEAD = (1, 2, 4, 8, 11)  # frames ahead in the tables
 FAR = slice(4, MADE)  # 5 to 11 frames ahead
 
 
-def psnr(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
+def psnr(images: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """Returns the PSNR of each image [..., H, W, 3]: [...]."""
-    both = (torch.from_numpy(np.ascontiguousarray(a).reshape(-1, *a.shape[-3:])) for a in (pictures, truth))
-    return psnr_db(*both).numpy().reshape(pictures.shape[:-3])
+    both = (torch.from_numpy(np.ascontiguousarray(a).reshape(-1, *a.shape[-3:])) for a in (images, truth))
+    return psnr_db(*both).numpy().reshape(images.shape[:-3])
 
 
-def pictures_db(pictures: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
+def images_db(images: dict[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
     """Returns PSNR by method [clips, MADE]: of the first sample, of the mean of samples, and of the best of N samples
     for each frame."""
-    found = {name: psnr(own[:, 0], truth) for name, own in pictures.items()}
-    samples = pictures["temperature 1"].shape[1]
-    for name in [name for name in pictures if name.startswith("temperature")]:
-        own = pictures[name]
+    found = {name: psnr(own[:, 0], truth) for name, own in images.items()}
+    samples = images["temperature 1"].shape[1]
+    for name in [name for name in images if name.startswith("temperature")]:
+        own = images[name]
         of_each = np.stack([psnr(own[:, s], truth) for s in range(own.shape[1])], 1)
         for count in [count for count in (4, 8, SAMPLES) if count <= own.shape[1]]:
             found[f"{name}, mean of {count}"] = psnr(own[:, :count].mean(1, dtype=np.float32), truth)
             found[f"{name}, best of {count}"] = of_each[:, :count].max(1)
-    mean = pictures["temperature 1"].mean(1, dtype=np.float32)
-    found[f"mean of auto and of {samples}"] = psnr(0.5 * (mean + pictures["auto"][:, 0]), truth)
+    mean = images["temperature 1"].mean(1, dtype=np.float32)
+    found[f"mean of auto and of {samples}"] = psnr(0.5 * (mean + images["auto"][:, 0]), truth)
     return found
 
 
@@ -47,10 +47,10 @@ def real_clips(data: Path, kind: str, count: int) -> np.ndarray:
     return np.stack([read_rgb(path)[0][GIVEN : GIVEN + MADE] for path in chosen]) if chosen else np.empty(0)
 
 
-def frechet_ratios(pictures: dict[str, np.ndarray], truth: np.ndarray, others: np.ndarray) -> dict[str, dict]:
+def frechet_ratios(images: dict[str, np.ndarray], truth: np.ndarray, others: np.ndarray) -> dict[str, dict]:
     """Returns the distance from the true clips as a ratio of the last frame's, by kind of features and method."""
     network = frechet.FrameFeatures()
-    shown = {name: network.of(own[:, 0]) for name, own in pictures.items()}
+    shown = {name: network.of(own[:, 0]) for name, own in images.items()}
     if len(others):
         shown["other real clips"] = network.of(others)
     real, found = network.of(truth), {}
@@ -68,33 +68,33 @@ def clips_of(data: Path, kind: str, count: int | None) -> Clips:
     return Clips(clips.frames[:count], clips.fps[:count], clips.names[:count])
 
 
-def uncertainties(clips: Clips, pictures: dict[str, np.ndarray], bits: dict[str, np.ndarray]) -> dict[str, tuple]:
+def uncertainties(clips: Clips, images: dict[str, np.ndarray], bits: dict[str, np.ndarray]) -> dict[str, tuple]:
     """Returns an uncertainty measure of each cell and the error of the cell, by comparison: [clips, MADE, 16, 16]
     twice."""
     given, truth = (part.numpy() for part in clips.frames[:, : GIVEN + MADE].split((GIVEN, MADE), 1))
-    drawn = bits["temperature 1"].mean(1)
-    changed = np.broadcast_to(uncertainty.cell_errors(given[:, -2:-1], given[:, -1:]), drawn.shape)
-    mean = uncertainty.cell_errors(pictures["temperature 1"].mean(1, dtype=np.float32), truth)
-    of_auto = uncertainty.cell_errors(pictures["auto"][:, 0], truth)
+    sample_bits = bits["temperature 1"].mean(1)
+    changed = np.broadcast_to(uncertainty.cell_errors(given[:, -2:-1], given[:, -1:]), sample_bits.shape)
+    mean = uncertainty.cell_errors(images["temperature 1"].mean(1, dtype=np.float32), truth)
+    of_auto = uncertainty.cell_errors(images["auto"][:, 0], truth)
     return {
         "likeliest, its bits": (
             bits["likeliest"][:, 0],
-            uncertainty.cell_errors(pictures["likeliest"][:, 0], truth),
+            uncertainty.cell_errors(images["likeliest"][:, 0], truth),
         ),
-        "mean of samples, their bits": (drawn, mean),
-        "mean of samples, what changed last": (changed, mean),
-        "auto, bits of samples": (drawn, of_auto),
-        "auto, what changed last": (changed, of_auto),
+        "mean of samples, their bits": (sample_bits, mean),
+        "mean of samples, latest change": (changed, mean),
+        "auto, bits of samples": (sample_bits, of_auto),
+        "auto, latest change": (changed, of_auto),
     }
 
 
-def measure_pictures(
+def measure_images(
     clips: Clips, others: np.ndarray, bundle: Path, samples: int = SAMPLES
 ) -> tuple[dict, dict[str, float]]:
     """Returns the document, and all metrics except times. others: real clips of real_clips()."""
     truth = clips.frames[:, GIVEN : GIVEN + MADE].numpy()
-    pictures, bits = went_on(clips, bundle, samples)
-    decibels = pictures_db(pictures, truth)
+    images, bits = continued(clips, bundle, samples)
+    decibels = images_db(images, truth)
     document: dict = {"clips": len(clips), "given": GIVEN, "made": MADE, "ahead": list(AHEAD)}
     document |= {"psnr_db": {}, "rank": {}, "reliability": {}}
     better = np.maximum(decibels["last frame"].mean(0), decibels["motion"].mean(0))
@@ -106,12 +106,12 @@ def measure_pictures(
         "sampled_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"],
         "refined_gain_db": gained["auto, refined"],
     }
-    for name, (uncertain, errors) in uncertainties(clips, pictures, bits).items():
+    for name, (uncertain, errors) in uncertainties(clips, images, bits).items():
         each = uncertainty.by_frame(uncertain, errors)
         document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]
         document["reliability"][name] = uncertainty.reliability(uncertain, errors)
     metrics["uncertainty_rank"] = document["rank"]["mean of samples, their bits"][-1]
-    document["frechet"] = frechet_ratios(pictures, truth, others)
+    document["frechet"] = frechet_ratios(images, truth, others)
     metrics["sampled_frechet_ratio"] = document["frechet"]["changes"]["temperature 1"]
     metrics["refined_frechet_ratio"] = document["frechet"]["changes"]["auto, refined"]
     return document, metrics

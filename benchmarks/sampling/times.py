@@ -24,8 +24,8 @@ CASES = {  # samples, frames, passes
 }
 
 
-PLACES = 256  # cells of a frame
-RECOMPUTING = "all places again for each, estimated"
+CELLS_A_FRAME = 256  # cells of a frame
+RECOMPUTING = "all cells again for each, estimated"
 
 
 def times_ms(bundle: Path, frames: np.ndarray, step_s: float, threads: int = 1, rounds: int = 11) -> dict[str, float]:
@@ -48,7 +48,7 @@ def times_ms(bundle: Path, frames: np.ndarray, step_s: float, threads: int = 1, 
     medians = {name: statistics.median(own) for name, own in found.items()}
     further = predictors[16].stats["pass_count"] - 1  # fewer than 15 if sampling converged earlier
     a_pass = (medians["16 passes"] - medians["1 pass"]) / max(further, 1)
-    return medians | {RECOMPUTING: medians["1 pass"] + (PLACES - 1) * a_pass}
+    return medians | {RECOMPUTING: medians["1 pass"] + (CELLS_A_FRAME - 1) * a_pass}
 
 
 def metrics_of(times: dict[str, float]) -> dict[str, float]:

@@ -7,10 +7,10 @@ import numpy as np
 CELLS = 16  # cells a side
 
 
-def cell_errors(pictures: np.ndarray, truth: np.ndarray) -> np.ndarray:
+def cell_errors(images: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """Returns the root mean squared error of each cell in grey levels: [..., H, W, 3] -> [..., 16, 16]. Rows and
     columns that do not fill a cell are left out."""
-    square = (pictures.astype(np.float32) - truth.astype(np.float32)) ** 2
+    square = (images.astype(np.float32) - truth.astype(np.float32)) ** 2
     high, wide = square.shape[-3] // CELLS, square.shape[-2] // CELLS
     square = square[..., : CELLS * high, : CELLS * wide, :]
     parts = square.reshape(*square.shape[:-3], CELLS, high, CELLS, wide, 3)

@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
-from benchmarks.scenes import plots as scene_pictures
+from benchmarks.scenes import plots as scene_plots
 from benchmarks.scenes import quality as scene_quality
 from benchmarks.scenes import speed as scene_speed
 from benchmarks.scenes.settings import SHIPPED, Sources, settings, sources
@@ -67,7 +67,7 @@ def measure(given: Sources, folder: Path, threads: int, quick: bool) -> tuple[di
     warnings = warnings_of(places, perceptual is not None)
     if fraction > MAX_OTHERS:
         warnings.append(f"other processes used {fraction:.0%} of the CPU (scenes)")
-    sheet = scene_pictures.write_sheet(shown, rows, folder)
+    sheet = scene_plots.write_sheet(shown, rows, folder)
     document = {"rows": rows, "places": places, "speed": speed, "speed_missing": why, "warnings": warnings,
                 "sheet": sheet.name if sheet else ""}  # fmt: skip
     metrics, missing = quality_figures(rows, given)

@@ -29,12 +29,12 @@ MAX_ROWS = 6
 
 def write(measured: dict, folder: Path) -> list[Path]:
     """Writes the images of the measured values into `folder`; the contact sheet exists already."""
-    drawn: dict[str, tuple[bool, Callable[[dict], plt.Figure]]] = {
+    plots: dict[str, tuple[bool, Callable[[dict], plt.Figure]]] = {
         "scenes-quality.png": (any(row["rendered"] for row in measured["rows"]), quality),
         "scenes-frame-time.png": (bool(measured["speed"]), frame_time),
     }
     written = []
-    for name, (is_there, draw) in drawn.items():
+    for name, (is_there, draw) in plots.items():
         if is_there:
             figure = draw(measured)
             figure.savefig(folder / name, dpi=110, bbox_inches="tight")

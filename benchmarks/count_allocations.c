@@ -1,13 +1,13 @@
-/* Counts what a program takes from the heap between two frames of a source: for benchmarks/cameras.py.
+/* Counts the heap allocations of a program between two frames of a source (benchmarks/cameras.py).
  *
  *   cc -shared -fPIC -O2 -I sdk/include -o count_allocations.so benchmarks/count_allocations.c
  *   LD_PRELOAD=./count_allocations.so COUNT_FROM=200 COUNT_TO=1200 COUNT_FILE=count.json \
  *       maquette play 'stub:pattern?live=1&fps=400' --frames 1200 --no-picture
  *
  * writes {"frames": 1000, "allocations": 0, "of_onnxruntime": 0} when frame 1200 is taken: allocations of all threads
- * since frame 200 was, and those of them that ONNX Runtime made, by the nearest caller in it or in the SDK. The first
- * ones are shown on standard error by their stacks, to be read by `addr2line -Cfe` of a library that has its symbols;
- * with COUNT_OWN=1 the first ones that are not of ONNX Runtime. Needs glibc.
+ * since frame 200, and those by ONNX Runtime (its code, rather than the SDK's, is the nearest caller of the two). The
+ * stacks of the first ones go to standard error, for `addr2line -Cfe` of a library with symbols; COUNT_OWN=1 leaves out
+ * the stacks of ONNX Runtime. Needs glibc.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -35,7 +35,7 @@ static atomic_bool shows_own_only;
 static atomic_long allocations, of_onnxruntime, shown;
 static _Thread_local bool is_showing; /* a stack, which may allocate */
 
-/* Whether the nearest caller that is in ONNX Runtime or in the SDK is in ONNX Runtime. */
+/* Returns whether ONNX Runtime, rather than the SDK, is the nearest caller of the two. */
 static bool is_onnxruntime(void* const* stack, int depth) {
   for (int i = 0; i < depth; ++i) {
     Dl_info info;
@@ -109,7 +109,7 @@ static void write_count(long frames) {
   if (file > STDERR_FILENO) close(file);
 }
 
-/* In place of the library's: one thread of the program takes frames. */
+/* Replaces the function of the library; one thread of the program takes frames. */
 maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame) {
   static maq_status (*real)(maq_source*, int64_t, maq_frame**);
   static long taken, from, to;

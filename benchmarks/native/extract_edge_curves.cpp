@@ -1,5 +1,5 @@
-// Extracts curves from fields that benchmarks/edges/curve_extraction.py packed into a file; prints a JSON object a
-// view:
+// Extracts curves from the fields in a file of benchmarks/edges/curve_extraction.py; prints a JSON object for each
+// view.
 //   extract_edge_curves FIELDS
 // FIELDS: for each view int32 width, height; float64 fx, fy, cx, cy, eps_r, spread_r; the planes distance_r (float32),
 // depth_m (float32) and kind (uint8).

@@ -1,4 +1,4 @@
-// The motion from each frame of a clip to the next as predictors find it, for benchmarks/foreseen.
+// Prints the motion from each frame of a clip to the next, as predictors estimate it (benchmarks/prediction_quality).
 //
 //   find_motion WIDTH HEIGHT < frames > motion    BGR, rows without padding; float32 [T - 1, HEIGHT, WIDTH, 2], in
 //                                                 pixels to the right and down

@@ -1,5 +1,5 @@
-/* Preloaded into an emulated program: its monotonic clock counts the instructions that it has executed, one as a
- * nanosecond. What measures times then tells instructions: 1 ms is a million of them.
+/* Preloaded into an emulated program: its monotonic clock returns the number of executed instructions, one as a
+ * nanosecond. A measured time of 1 ms then means a million instructions.
  *
  *   cc -shared -fPIC -o instruction_clock.so instruction_clock.c
  *   MAQ_INSTRUCTION_COUNTER=FILE LD_PRELOAD=instruction_clock.so PROGRAM      FILE: count_instructions.c writes it */

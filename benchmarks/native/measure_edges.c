@@ -1,15 +1,15 @@
-/* A stream of depth frames through the edge network, as an app runs it, for benchmarks/edges/speed.py:
+/* Runs a stream of depth frames through the edge network, like an app (benchmarks/edges/speed.py):
  *
  *   measure_edges BUNDLE URI FRAMES THREADS
  *
- * prints {"memory_mb": 30.1}: what the network and its stream add to the peak memory of the process. Preloaded with
- * benchmarks/count_allocations.c, what a frame takes from the heap is counted too. */
+ * prints {"memory_mb": 30.1}: the peak memory that the network and its stream add to the process. With
+ * benchmarks/count_allocations.c preloaded, the heap allocations of a frame are counted too. */
 #include <maquette/maquette.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the program alone: getrusage() begins with the peak of the process that started it. */
+/* Returns the peak of this program alone; getrusage() begins with the peak of its parent process. */
 static double peak_mb(void) {
   char line[128];
   double kib = 0;

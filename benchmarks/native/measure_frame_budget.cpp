@@ -1,11 +1,10 @@
-// How a frame budget is kept: benchmarks/frame_budget.py runs this, on a processor that it throttles.
+// Runs a pipeline with a frame budget, on a processor that benchmarks/frame_budget.py throttles.
 //
 //   measure_frame_budget DENSEPOSE_BUNDLE URI BUDGET_MS LABELS
 //
-// maps every frame of a source, which must not be live, by a pipeline with that budget (0: none) on one thread of the
-// networks. Prints a JSON list: of each frame the milliseconds that the model took, the long side of the networks'
-// input and whether it was a key frame. Writes the body part of each pixel, a byte, frame after frame, to the file
-// LABELS.
+// maps every frame of a source, which must not be live, with that budget (0: none) on one thread. Prints a JSON list
+// with an entry for each frame: milliseconds of the model, long side of the networks' input, and whether it was a key
+// frame. Writes the body part of each pixel, a byte, frame after frame, to the file LABELS.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

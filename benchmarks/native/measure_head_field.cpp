@@ -1,5 +1,5 @@
-// Microseconds a point of the head field's engine, one thread, for each width and instruction set: the minimum of many
-// runs of a batch that stays in the core's second cache.
+// Prints microseconds a point of the head field on one thread, for each width and instruction set: the minimum of many
+// runs of a batch that fits the second-level cache.
 //   measure_head_field [WIDTH...]
 #include <algorithm>
 #include <chrono>
@@ -21,7 +21,7 @@ using maq::head::FieldWeights;
 using maq::head::WeightGradient;
 
 constexpr size_t kPoints = 256;
-constexpr double kSeconds = 0.4;  // for each figure
+constexpr double kSeconds = 0.4;  // for each metric
 
 double microseconds(const std::function<void()>& work) {
   using Clock = std::chrono::steady_clock;
@@ -42,7 +42,7 @@ void measure(FieldIsa isa, int width) {
   FieldWeights weights(shape), gradient(shape);
   std::mt19937 random(1);
   std::normal_distribution<float> normal(0.0f, 0.15f);
-  for (float& value : weights.values()) value = normal(random);  // padding, too: nobody reads it
+  for (float& value : weights.values()) value = normal(random);  // padding too, which is never read
   FieldEngine engine(shape, isa);
   engine.set_weights(weights);
   std::vector<std::vector<float>> planes(16, std::vector<float>(kPoints, 0.1f));

@@ -1,6 +1,6 @@
-// Pictures a second of a turning head, 640 x 480: `measure_head_renderer [head.maqh [threads [triangles]]]`. Without a
-// head of a ball of its size. The median of the pictures of one turn, and the time of processors for each; with smooth
-// edges, and without.
+// Measures images of a rotating head, 640 x 480: `measure_head_renderer [head.maqh [threads [triangles]]]`. Without a
+// head it renders a ball of that size. Prints the median time of the images of one turn and the processor time of each,
+// with antialiasing and without.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include <optional>
 #include <vector>
 
-#include "head/reconstruction/head_surface.h"
 #include "head/files/head_file.h"
+#include "head/reconstruction/head_surface.h"
 #include "head/render/head_renderer.h"
 #include "support/samples/ball_mesh.h"
 

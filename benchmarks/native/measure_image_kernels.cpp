@@ -1,5 +1,5 @@
-// The time of converting and resizing a frame of 640 x 480, beside OpenCV's, on one thread: the minimum of many runs,
-// measured alternately.
+// Measures the conversion and resizing of a frame of 640 x 480 beside OpenCV on one thread: the minimum of many runs,
+// which alternate.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>

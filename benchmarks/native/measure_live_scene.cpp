@@ -1,9 +1,9 @@
-// How long an app with a window waits for a live scene: benchmarks/window.py runs this.
+// Measures the wait of an app with a window for a live scene (benchmarks/ui_latency.py).
 //
 //   measure_live_scene SCENE_BUNDLE SCENE_OR_CAPTURE
 //
-// prints {"open_ms": …, "first_view_ms": …, "longest_call_ms": …}: from the call of open() until the app knows that the
-// scene is ready, until it has the first view of 640 x 480, and the longest call of the window's thread.
+// prints {"open_ms": …, "first_view_ms": …, "longest_call_ms": …}: from open() until the app is told that the scene is
+// ready, from open() until the first view of 640 x 480, and the longest call of the window's thread.
 #include <app/fly_camera.h>
 #include <app/live_scene.h>
 

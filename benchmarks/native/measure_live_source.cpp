@@ -1,10 +1,10 @@
-// When an app with a window hears of a live source: benchmarks/window.py runs this.
+// Measures the notifications of an app with a window about a live source (benchmarks/ui_latency.py).
 //
 //   measure_live_source DENSEPOSE_BUNDLE URI SECONDS
 //
-// plays the source twice with one LiveDensePose, whose model the first time loads. Prints a JSON list of both: events,
-// in ms since open() was called (the state that the app is told of, or "result" for the first result after a state),
-// and the longest call of the window's thread, which asks for the status every 5 ms.
+// plays the source twice with one LiveDensePose; its model loads the first time. Prints a JSON list of both: events, in
+// ms since open() was called (the state of the notification, or "result" for the first result after a state), and the
+// longest call of the window's thread, which asks for the status every 5 ms.
 #include <app/live_densepose.h>
 
 #include <algorithm>
@@ -65,7 +65,7 @@ class Events {
   std::vector<Event> events_;
 };
 
-// The longest call, ms.
+// Returns the longest call in ms.
 double play(maquette::LiveDensePose& live, const std::string& uri, double seconds) {
   const Clock::time_point start = Clock::now();
   live.open(uri);

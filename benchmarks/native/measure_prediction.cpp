@@ -1,4 +1,4 @@
-// What predictors make of a clip, and how long they take; how long predicted frames of a concealer are waited for
+// Measures predicted frames of a clip and their time, and the delay of predicted frames of a concealer
 // (benchmarks/prediction.py).
 //
 //   measure_prediction errors WIDTH HEIGHT FPS THREADS BUNDLE HORIZON... < frames    BGR, rows without padding
@@ -15,7 +15,7 @@
 
 namespace {
 
-// Predictions begin at every third frame from the fifth on: by then `auto` has frames to judge by.
+// Predictions begin at every third frame from the fifth on: `auto` has seen enough frames by then.
 constexpr size_t kFirstStart = 4, kStartStep = 3;
 
 using Pixels = std::vector<uint8_t>;
@@ -33,7 +33,7 @@ double quantile(std::vector<double> values, double fraction) {
   return *at;
 }
 
-// Of all threads of this process.
+// CPU time of all threads of this process.
 double processor_ms() { return double(std::clock()) * 1000 / CLOCKS_PER_SEC; }
 
 maquette::Frame frame_of(const maquette::Context& context, const Pixels& pixels, int width, int height,
@@ -50,10 +50,10 @@ maquette::Frame frame_of(const maquette::Context& context, const Pixels& pixels,
 
 struct Sums {
   double last_db = 0, motion_db = 0, auto_db = 0, network_db = 0;
-  double motion_fraction = 0;  // of auto's pictures
+  double motion_fraction = 0;  // in the blend of auto
 };
 
-// `bundle`: folder of the network that mends.
+// bundle: folder of the refining network.
 int measure_errors(int width, int height, double fps, int threads, const char* bundle,
                    const std::vector<size_t>& horizons) {
   std::vector<Pixels> frames;

@@ -1,6 +1,6 @@
-// Seconds and memory of making a scene of noise photos and a made-up room, step by step: `measure_scene_builder BUNDLE
-// [points [views [width height [threads [roll in degrees]]]]]`. Each photo is rolled by an angle of its own, up to
-// `roll`, as cameras in hands are; with 0 all are of one size.
+// Measures seconds and memory of each step of building a scene from noise photos and a synthetic room:
+// `measure_scene_builder BUNDLE [points [views [width height [threads [roll in degrees]]]]]`. Each photo is rolled by
+// an angle of its own, up to `roll`, like photos of a hand-held camera; with 0 all have one size.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,6 @@
-// Milliseconds of each step of rendering, on made-up scenes: `measure_scene_renderer BUNDLE [points [width height
-// [threads [frames]]]]`. Medians over the frames of an orbit, and the work of the last one; the first frame, which
-// prepares the refiner, is apart.
+// Measures milliseconds of each step of rendering synthetic scenes: `measure_scene_renderer BUNDLE [points [width
+// height [threads [frames]]]]`. Prints medians over the frames of an orbit, and the work of the last frame. The first
+// frame, which prepares the refiner, is listed separately.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,7 +18,7 @@ using maq::kFeatures;
 
 enum class Kind { kRoom, kObject };
 
-// A room is seen from within, a part of it at a time; of an object nothing is outside of the picture.
+// A room is seen from inside, one part at a time; an object is fully inside the image.
 maq::FittedPoints points_of(Kind kind, size_t count) {
   std::mt19937 random(1);
   std::normal_distribution<float> normal;

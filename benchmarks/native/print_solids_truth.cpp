@@ -1,9 +1,9 @@
-// What is true of stub:solids, for benchmarks/edges/curves.py:
+// Prints the ground truth of stub:solids (benchmarks/edges/curves.py):
 //
 //   print_solids_truth SCENE SEED WIDTH HEIGHT FRAMES
 //
-// prints {"cartons_m": [[x, y, z], ..], "frames": [[[[x, y, z], [x, y, z]], ..], ..]}: the sides of each carton, and
-// the parts of sharp edges that the camera sees in each of the first frames, in its coordinates, metres.
+// prints {"cartons_m": [[x, y, z], ..], "frames": [[[[x, y, z], [x, y, z]], ..], ..]}: the sides of each box, and the
+// parts of sharp edges that the camera sees in each of the first frames, in its coordinates, metres.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -13,7 +13,7 @@
 
 namespace {
 
-constexpr double kFramesPerSecond = 30;  // of a stub, unless its URI says otherwise
+constexpr double kFramesPerSecond = 30;  // default of a stub
 
 void print(const maq::Vector3& p) { std::printf("[%.9g, %.9g, %.9g]", p[0], p[1], p[2]); }
 

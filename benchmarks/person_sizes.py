@@ -154,9 +154,9 @@ def section(rows: list[dict]) -> tuple[str, list]:
     return "People at any size", [
         ("people-at-any-size.png", "Input size, crops of people and key frames, on images that no training saw."),
         "Rendered people of 640 x 512, a third of them from behind, many tilted, small or in crowds; photographs, "
-        "judged by what other networks say of them; a person seen by four calibrated cameras at five moments (gain: "
+        "scored with labels of other networks; a person seen by four calibrated cameras at five moments (gain: "
         "how much nearer points of equal part, U and V lie to each other's epipolar lines than points of the same part "
         "paired at random). The time is the median over all these images.",
-        *([f"Not measured: {missing}, for want of labels (python -m export.teachers)."] if missing else []),
+        *([f"Not measured: {missing}, because labels are missing (python -m export.teachers)."] if missing else []),
         table,
     ]

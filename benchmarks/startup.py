@@ -85,9 +85,9 @@ def section(measured: dict) -> tuple[str, list]:
         files.append([file["name"], f"{file['bytes'] / 1e6:.3f}", ", ".join(file["needed"])])
     return "Start of an app", [
         processes,
-        "A small C program. Shared libraries: all that are loaded, without the program and what the kernel maps. CPU "
-        "time: of all threads since the process began, the loading of libraries included.",
+        "A small C program. Shared libraries: all loaded ones, without the program and the kernel's object. CPU time: "
+        "all threads since the process began, including the loading of libraries.",
         files,
-        "libmaquette_files is loaded when a file or a clip is opened, with what it needs; an app with a camera never "
-        "loads it.",
+        "libmaquette_files and its dependencies are loaded when a file or a clip is opened; an app with a camera never "
+        "loads them.",
     ]

@@ -161,22 +161,22 @@ def section(measured: dict) -> tuple[str, list]:
     longest_ms = max(run["longest_call_ms"] for kind in kinds for run in measured[kind])
     parts: list = [
         waits,
-        "By the library of apps with a window (sdk/app). The live source is a stub of one person, 640 x 480 at 30 "
-        f"frames a second, unplugged for {ABSENCE_MS / 1000:g} s as its URI asks; the scene is the room of "
-        "tests/media. The longest call that the window's thread made of all these: "
+        "Measured with the library of apps with a window (sdk/app). The live source is a stub of one person, 640 x 480 "
+        f"at 30 frames a second, unplugged for {ABSENCE_MS / 1000:g} s as its URI asks; the scene is the room of "
+        "tests/media. The longest call of the window's thread took "
         f"{longest_ms:.2f} ms.",
     ]
     if measured["demo_missing"]:
-        return "What an app with a window waits for", [
+        return "Waits of an app with a window", [
             *parts, f"The demo's window was not measured: {measured['demo_missing']}."]  # fmt: skip
     window = [["maquette-demo with", "longest frame, ms (median)", "worst run", "p99", "frames of a run", "runs"]]
     for name, runs in measured["demo"].items():
         longest = [run["longest_ms"] for run in runs]
         window.append([DEMO_RUNS[name][0], f"{statistics.median(longest):.1f}", f"{max(longest):.1f}",
                        f"{median(runs, 'p99_ms'):.1f}", f"{median(runs, 'frames'):.0f}", str(len(runs))])  # fmt: skip
-    return "What an app with a window waits for", [
+    return "Waits of an app with a window", [
         *parts,
         window,
-        "Frames of the window's thread, from reading the input to showing the image, while the networks run as fast "
-        "as they can on threads of their own; on a display in memory (Xvfb), drawn by the processor.",
+        "Frames of the window's thread, from reading the input to showing the image, while the networks run at "
+        "full speed on other threads. The display is in memory (Xvfb) and rendered by the processor.",
     ]

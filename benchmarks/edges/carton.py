@@ -157,7 +157,7 @@ def main(argv: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("--capture", type=Path, default=CAPTURE, help="default: %(default)s")
-    parser.add_argument("--bundle", type=Path, help="default: the one that the program ships")
+    parser.add_argument("--bundle", type=Path, help="default: the shipped bundle")
     options = parser.parse_args(argv)
     try:
         found = measure(options.capture, options.bundle)

@@ -96,16 +96,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds arguments for views and networks."""
     named = {"nargs": "+", "default": [], "type": _named}
     parser.add_argument("--solids", type=Path, default=SOLIDS, metavar="DIR",
-                        help=f"rendered solids with val and test, made if not there; default: {SOLIDS}")  # fmt: skip
-    parser.add_argument("--solid-views", type=int, metavar="N", help="of each set, evenly; default: all")
+                        help=f"rendered solids with val and test, made if missing; default: {SOLIDS}")  # fmt: skip
+    parser.add_argument("--solid-views", type=int, metavar="N", help="views of each set, spread evenly; default: all")
     parser.add_argument("--edge-bundle", type=Path, default=BUNDLE, metavar="BUNDLE", help=f"default: {BUNDLE}")
     parser.add_argument("--edge-weights", type=Path, default=WEIGHTS, metavar="FILE",
                         help=f"the same network in float; default: {WEIGHTS}")  # fmt: skip
-    parser.add_argument("--other-edge-weights", **named, metavar="NAME=FILE", help="in float, to compare with: m=m.pt")
-    parser.add_argument("--other-edge-bundles", **named, metavar="NAME=BUNDLE", help="to compare with: m-int8=DIR")
+    parser.add_argument("--other-edge-weights", **named, metavar="NAME=FILE", help="float weights to compare: m=m.pt")
+    parser.add_argument("--other-edge-bundles", **named, metavar="NAME=BUNDLE", help="bundles to compare: m-int8=DIR")
     default = f"{CAD_PARTS}={SOLIDS / CAD_PARTS} if there"
     parser.add_argument("--edge-parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART",
-                        help="fields, curves (both errors), times; others are of the last run in --out")  # fmt: skip
+                        help="fields, curves (both errors), times; the others are kept")  # fmt: skip
     parser.add_argument("--edge-sets", **named, metavar="NAME=DIR", help=f"further whole views; default: {default}")
 
 

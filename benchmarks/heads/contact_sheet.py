@@ -161,12 +161,12 @@ def draw(measured: Mapping, bundle: Path, sources: Sources, out: Path, threads: 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--photos", type=Path, default=PHOTOS, help=f"real photographs; default: {PHOTOS}")
-    parser.add_argument("--photo-count", type=int, default=6, help="of these, at most")
+    parser.add_argument("--photo-count", type=int, default=6, help="maximum number of photographs")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--metrics", type=Path, default=METRICS, help=f"of quality.py; default: {METRICS}")
+    parser.add_argument("--metrics", type=Path, default=METRICS, help=f"output of quality.py; default: {METRICS}")
     parser.add_argument("--data", type=Path, default=DATA, help=f"default: {DATA}")
     parser.add_argument("--backgrounds", type=Path, default=BACKGROUNDS, help=f"default: {BACKGROUNDS}")
     parser.add_argument("--bundle", type=Path, default=BUNDLE, help=f"default: {BUNDLE}")

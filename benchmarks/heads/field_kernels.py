@@ -147,7 +147,7 @@ def kernel_table(rows: list[Mapping]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", type=Path, default=PROGRAM, help=f"default: {PROGRAM}")
-    parser.add_argument("--width", type=int, default=WIDTH, help="of the hidden layers")
+    parser.add_argument("--width", type=int, default=WIDTH, help="width of the hidden layers")
     options = parser.parse_args()
     if not options.program.exists():
         raise SystemExit(f"{options.program} is missing: cmake --build --preset release --target measure_head_field")

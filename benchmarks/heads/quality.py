@@ -3,7 +3,7 @@
     python -m benchmarks.heads.quality --data .data/heads --heads 20 --seconds 0 0.5 1 2 5 10
 
 In: `make build`, the bundle, images and points of test heads (`export.heads.view_shards test`, `export.heads.points
-test`), what they are made from (`export.people.assets`), heads of another maker (`benchmarks.heads.other_heads`),
+test`), their assets (`export.people.assets`), heads of another source (`benchmarks.heads.other_heads`),
 photos without people (`export.photos backgrounds`). Out: tables (Markdown) and all metrics (JSON). The library is given
 the head's box, and its focal length only with --known-focal.
 """
@@ -264,8 +264,8 @@ def parser_of(description: str) -> argparse.ArgumentParser:
     parser.add_argument("--data", type=Path, default=DATA, help=f"views, points and other heads; default: {DATA}")
     parser.add_argument("--backgrounds", type=Path, default=BACKGROUNDS, help=f"default: {BACKGROUNDS}")
     parser.add_argument("--bundles", type=Path, nargs="+", default=[BUNDLE], metavar="BUNDLE",
-                        help=f"the first is reported, others beside it; default: {BUNDLE}")  # fmt: skip
-    parser.add_argument("--heads", type=int, default=20, help="of each set, at most")
+                        help=f"the first is reported, the others are compared with it; default: {BUNDLE}")  # fmt: skip
+    parser.add_argument("--heads", type=int, default=20, help="maximum number of heads of each set")
     parser.add_argument("--seconds", type=float, nargs="+", default=SECONDS, help="times of fitting")
     parser.add_argument("--at", type=float, default=2.0, help="the time whose metrics are compared with targets")
     parser.add_argument("--sets", nargs="+", choices=("one", "three", "other"), default=("one", "three", "other"))

@@ -21,33 +21,32 @@ from benchmarks.heads.tables import (
 )
 from benchmarks.heads.targets import targets
 
-_HOW = """Distances go from points of the true surface, above the cut and seen from outside, to the mesh that the
-library gives, after the true head was moved, rotated and scaled to where it fits best: by its face for the face (95 mm
-around the tip of the nose), by all for the head; *not aligned*: as the library gives it. All are means over heads. *By
-mean head*: divided by the same of the head that the prior has before it sees a photo. *Normals*: the true mesh itself
-has 6 to 10 degrees, since its normals are smooth and its triangles flat. *Size off by*: the median over heads, with the
-sign left out; *camera rotated by*: the median angle to the true camera, in frames that hold a head by its skull. Photos
-are rendered, in front of photographs, from up to 45° to the side; the library is given the head's box"""
+_HOW = """Distances go from points of the true surface, above the clip plane and visible from outside, to the mesh of
+the library. The true head is first moved, rotated and scaled to the best fit: with its face for the face (95 mm around
+the tip of the nose), with all points for the head. *Not aligned*: without this fit. Values are means over heads. *By
+mean head*: ratio to the same value of the prior's mean head. *Normals*: the true mesh itself has 6 to 10 degrees, since
+its normals are smooth and its triangles flat. *Size off by*: median absolute value over heads. *Camera rotated by*:
+median angle to the true camera, in frames aligned by the skull. Photos are rendered in front of photographs, from up to
+45° to the side. The library gets the head's box"""
 
-_TIME = """A fit ends by its time, by 300 steps, or when the pixels held out gain no more. Where time ends it, the
-metrics depend on the machine and on what else it does: the column of steps says how far it came."""
+_TIME = """A fit ends by its time, after 300 steps, or when the held-out pixels no longer improve. If time ends it, the
+metrics depend on the machine and its load; the column of steps shows the progress."""
 
-_BASELINES = """*Linear head*: the 64 principal components of the vertices of the training heads, fitted to what the
-same encoder sees (template points) with the same camera model and prior. *MediaPipe's 468 points*: its face network's
-points with their depth, as a mesh; it covers the inner face alone, and is aligned by it, as all others are for that
-column. *Seen side*: true points that the photos show, after the alignment of the whole head; *unseen side*: the
-others. *Result to truth*: from points of the mesh to the true surface. *New views*: PSNR inside of both silhouettes
-of six views 30° to 60° around from the photo, in its light, before grey; of the fitted head with a texture of 512 x
-512, and *without texture* with the network's colours. The mean head has the photo projected onto it by the true
-camera, and where the photo does not see it the colour of the nearest place that it does. *By features*: how far
-features of the person detector's trunk differ, relative to their size, averaged over four layers (lower is better);
-in the manner of LPIPS, without anybody's judgement in it. NeuS from a sphere takes minutes and is not
-among them (its errors are in docs/research/heads.md; its program is at the tag studies-0.2)."""
+_BASELINES = """*Linear head*: the 64 principal components of the vertices of the training heads, fitted to the same
+encoder output (template points) with the same camera model and prior. *MediaPipe's 468 points*: points and depth of its
+face network as a mesh. It covers the inner face alone; in that column all heads are aligned by the inner face. *Seen
+side*: true points that the photos show, after the alignment of the whole head; *unseen side*: the others. *Result to
+truth*: from points of the mesh to the true surface. *New views*: PSNR inside both silhouettes of six views, 30° to 60°
+around from the photo, in its light, before grey. The fitted head has a texture of 512 x 512, and *without texture* the
+colours of the network. The mean head has the photo projected onto it by the true camera; unseen points have the colour
+of the nearest seen point. *By features*: relative difference of features of the person detector's trunk, averaged over
+four layers (lower is better), similar to LPIPS but without human judgement. NeuS from a sphere takes minutes and is not
+among the baselines (its errors are in docs/research/heads.md; its program is at the tag studies-0.2)."""
 
-_REAL = """Faces of photographs that training never saw (those of the validation split told when to end it). Points:
-mean distance in the photo from where MediaPipe's face network sees its points to where the same places of the fitted
-mesh are drawn; also by the distance between the outer corners of the eyes. Silhouette: IoU of the mesh, drawn into the
-photo, with the person's mask above the chin, where it is certain. Neither is told to the fit."""
+_REAL = """Faces of photographs that training never saw (the validation split decided when it ended). Points: mean
+distance in the photo between the points of MediaPipe's face network and the same landmarks of the rendered mesh; also
+relative to the distance of the outer corners of the eyes. Silhouette: IoU of the rendered mesh and the person's mask
+above the chin, where the mask is certain. The fit gets neither."""
 
 _GROUPS = (("yaw", yaw_of), ("size of the head", size_of))
 _TRAITS = ("hair", "beard", "skin", "glasses")
@@ -82,8 +81,8 @@ def warning(rows: Sequence[Mapping], at_s: float) -> str:
     steps = median(row["steps"] for row in found(rows) if row["asked_s"] == at_s)
     return (
         f"**Fits of {at_s:g} s came no further than {steps:.0f} steps: the machine was busy, or is too slow for this "
-        "time. Measure again, on a quiet machine or with more `--seconds`, before you believe metrics of the fit and "
-        "times; those at 0 s, of baselines and of sizes hold.**"
+        "time. Measure again, on an idle machine or with more `--seconds`. Metrics at 0 s, of baselines and of sizes "
+        "are reliable.**"
     )
 
 
@@ -127,7 +126,7 @@ def _more_parts(measured: Mapping, sheet: str) -> list[str]:
     if own := measured.get("prior"):
         mm = [f"{fmean(row[key] for row in own):.2f}" for key in ("face_mm", "head_mm", "mean_face_mm", "mean_head_mm")]
         parts += [
-            _title("what the prior can say at best"),
+            _title("limit of the prior"),
             f"Codes fitted to the true distances of {len(own)} heads instead of to photos, without alignment: face "
             f"{mm[0]} mm, head {mm[1]} mm; the mean head {mm[2]} and {mm[3]} mm.",
         ]
@@ -135,26 +134,25 @@ def _more_parts(measured: Mapping, sheet: str) -> list[str]:
         parts += _real_parts(measured["real"], at_s)
     if measured.get("ablation"):
         parts += [
-            _title("what settings cost and gain"),
+            _title("cost and gain of settings"),
             settings_table(measured["ablation"]),
-            "One photo, one setting changed at a time; times are medians from the photo to the mesh. What the engine "
-            "leaves out of itself (empty blocks, rays that miss) has no switch.",
+            "One photo, one setting changed at a time; times are medians from the photo to the mesh.",
         ]
     if measured.get("program"):
         parts += _program_parts(measured["program"])
     if measured.get("field_kernels"):
         parts += [
-            _title("the engine, one thread"),
+            _title("field kernels, one thread"),
             kernel_table(measured["field_kernels"]),
-            "Both in turn, the fastest runs; PyTorch in the batch size that suits it best. *Of the float peak*: "
-            "multiply-adds by the rate of the fastest matrix product on this machine.",
+            "Both alternate, and the fastest runs count; PyTorch has its best batch size. *Of the float peak*: ratio "
+            "of multiply-adds a second to the fastest matrix product on this machine.",
         ]
     if sheet:
         parts += [
-            "## To look at",
+            "## Contact sheet",
             f"![Photo, mesh over it, its normals, two new views, and the true head from there]({sheet})",
-            f"Of each set with one photo the best, the median and the worst by the whole head, after {at_s:g} s; then "
-            "real photographs.",
+            f"The best, the median and the worst head of each set with one photo, by the whole head, after {at_s:g} s; "
+            "then real photographs.",
         ]
     return parts
 
@@ -168,7 +166,7 @@ def page(measured: Mapping, sheet: str = "") -> str:
         f"Bundle {bundles[0]}; {machine['processor']}, {machine['cores']} cores. Written by `python -m "
         "benchmarks.heads` ([benchmarks/heads](../../benchmarks/heads/README.md)). "
         f"{provenance.sentence(measured.get('measured', {}))}",
-        f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and knows nothing of the camera'}.",
+        f"{_HOW} {'and the focal length' if measured.get('known_focal') else 'and no information about the camera'}.",
         _TIME,
         *filter(None, [warning(rows, at_s)]),
         f"## Targets, after {at_s:g} s",

@@ -119,5 +119,5 @@ def _of_kernels(measured: Mapping, lines: _Lines) -> None:
         # A fraction above 1 is impossible: other processes slowed PyTorch's peak.
         how = {"of_fit": False, "is_measured": best["fraction"] <= 1}
         by_torch = best["us"] / best["torch_us"]
-        lines.add("engine: a point of a step by PyTorch, one thread", by_torch, 0.33, 0.15, **how)
-        lines.add("engine: fraction of the float peak", best["fraction"], 0.4, 0.6, "≥", **how)
+        lines.add("field kernels: a point of a step, ratio to PyTorch, one thread", by_torch, 0.33, 0.15, **how)
+        lines.add("field kernels: fraction of the float peak", best["fraction"], 0.4, 0.6, "≥", **how)

@@ -32,13 +32,13 @@ NETWORKS, FP32 = Path("sdk/models/scenes-int8"), Path(".data/bundles/scenes-fp32
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds arguments for captures and networks."""
     parser.add_argument("--places", type=Path, default=PLACES, metavar="DIR",
-                        help=f"rendered places, made if not there; default: {PLACES}")  # fmt: skip
+                        help=f"rendered captures, made if missing; default: {PLACES}")  # fmt: skip
     parser.add_argument("--real", type=Path, nargs="+", metavar="DIR",
-                        help=f"real places, folders with transforms.json each; default: all in {REAL}")  # fmt: skip
+                        help=f"real captures, folders with transforms.json each; default: all in {REAL}")  # fmt: skip
     parser.add_argument("--networks", type=Path, default=NETWORKS, metavar="BUNDLE", help=f"default: {NETWORKS}")
     parser.add_argument("--fp32", type=Path, default=FP32, metavar="BUNDLE", help=f"the same in fp32; default: {FP32}")
     parser.add_argument("--other-networks", type=Path, nargs="+", default=[], metavar="BUNDLE",
-                        help="to compare with: other widths")  # fmt: skip
+                        help="bundles to compare, such as other widths")  # fmt: skip
     parser.add_argument("--fine-tuned", type=Path, metavar="DIR", help="scenes DIR/PLACE/{10s,60s,600s}.maqs")
 
 

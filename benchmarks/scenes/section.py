@@ -24,19 +24,19 @@ def section(measured: dict) -> tuple[str, list]:
         parts += [
             (
                 "scenes-quality.png",
-                "Error against the time to the first image, means over the rendered scenes. Named: ways "
-                "without a network, the scene as shipped, and what no other beats in both.",
+                "Error against the time to the first image, means over the rendered scenes. Named: baselines without a "
+                "network, the scene as shipped, and the Pareto front.",
             ),
             error_rows(rows, "rendered"),
-            "First image: from the capture on disk, whose cameras and cloud are given, to an image; two processes of "
-            "the command line for ours, Python that has started for the ways without a network. Nearest photo: the "
-            "source photo whose camera is nearest, by how far the cloud's points move in the image. Plain points: "
-            "one pixel a point, the nearest in front; pyramid: where a finer raster has no point, the next coarser "
-            "shows. Behind both is the mean colour of what photos show where no point is. PSNR and SSIM (11 x 11 "
-            "Gaussian window, sigma 1.5, mean of the three channels) of RGB; every pixel counts, borders and "
-            "background too. Distance: relative difference of features of the person detector's MobileNetV2, "
-            "averaged over four layers; in the manner of LPIPS, but not LPIPS: nobody's judgement is in it, and its "
-            "metrics compare with none elsewhere. What is half the size is compared with photos of half the size.",
+            "First image: time from the capture on disk, with given cameras and cloud, to an image. It covers two "
+            "processes of the command line for our scenes, and a started Python process for baselines. Nearest photo: "
+            "the source photo with the nearest camera, by the mean motion of the cloud's points in the image. Plain "
+            "points: one pixel a point, the nearest in front. Pyramid: pixels without a point show the next coarser "
+            "raster. The background of both is the mean colour of photo pixels without a point. PSNR and SSIM (11 x 11 "
+            "Gaussian window, sigma 1.5, mean of the three channels) of RGB over all pixels. Distance: relative "
+            "difference of features of the person detector's MobileNetV2, averaged over four layers. It is similar to "
+            "LPIPS but without human judgement, so its values compare within this report only. Images of half the "
+            "size are compared with photos of half the size.",
         ]
     if any(row["real"] for row in rows):
         parts += ["On the real scenes:", error_rows(rows, "real")]
@@ -44,18 +44,18 @@ def section(measured: dict) -> tuple[str, list]:
     parts += [f"Not measured: {'; '.join(missing)}."] if missing else []
     gain = gain_over(rows, "pyramid of points")
     if gain is not None:
-        parts.append(f"Over the pyramid of points, which the refiner starts from, the networks gain {gain:+.2f} dB.")
+        parts.append(f"The networks gain {gain:+.2f} dB over the pyramid of points, which is the input of the refiner.")
     if measured["sheet"]:
-        caption = "Held-out photos and what each way makes of their cameras, with its PSNR."
+        caption = "Held-out photos and the image of each method from the same camera, with its PSNR."
         parts += [(measured["sheet"], caption), place_rows(there, rows)]
     saved = saving_rows(rows)
     if len(saved) > 1:
         parts += [
             saved,
-            "Work that a scene does not need, and what it costs to do it all the same: differences to the scene as "
-            "shipped, means over the rendered scenes. Error: the PSNR that leaving it out costs.",
-            "Points that no photo sees have no descriptor and are never stored: "
-            f"{unseen_fraction(rows):.0%} of the clouds'.",
+            "Cost of work that a scene skips: differences to the scene as shipped, means over the rendered scenes. "
+            "Error: the PSNR lost by skipping it.",
+            f"{unseen_fraction(rows):.0%} of the cloud points are seen by no photo; they have no descriptor and are "
+            "not stored.",
         ]
     if speed:
         parts += speed_parts(speed)

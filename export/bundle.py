@@ -1,4 +1,4 @@
-"""The manifest of a model bundle (docs/formats.md): what bundles of all tasks have in common, written and read.
+"""The manifest of a model bundle (docs/reference/formats.md): the part that all tasks share, written and read.
 
 What belongs to one task is added by the `bundle` of its package, such as `export.scenes.bundle`.
 """

@@ -1,4 +1,4 @@
-"""The table from (I, U, V) to points of the template body and back, as bundles carry it (docs/formats.md)."""
+"""The table from (I, U, V) to points of the template body and back, as bundles carry it (docs/reference/formats.md)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""64-bit XXH3, the check of the SDK's binary files (docs/formats.md), by libxxhash, which comes with the header that
-the SDK is built with (scripts/install-packages.sh)."""
+"""64-bit XXH3, the check of the SDK's binary files (docs/reference/formats.md), by libxxhash. It comes with the header
+that the SDK is built with (scripts/install-packages.sh)."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError
 from export.point_cloud import evenly_spread
 
-POINTS = 200_000  # this and the witnesses by the table in docs/scenes.md
+POINTS = 200_000  # this and the witnesses by the table in docs/research/scenes.md
 NEIGHBOURS = 4
 _BEST_ANGLE, _ANGLE_WIDTH = 10.0, 8.0  # degrees between two cameras and a point
 _AGREEMENT = 0.01  # of depth

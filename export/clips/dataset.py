@@ -2,8 +2,8 @@
 
     python -m export.clips.dataset pushing --split train --clips 600 --processes 1 --out .data/clips
 
-Each clip is a function of (set, split, number) alone, and its file (docs/formats.md) appears atomically: what is there
-already is kept, so a stopped run goes on where it was. Val and test clips have frames of 320 x 240 as well. Look at
+Each clip is a function of (set, split, number) alone, and its file (docs/reference/formats.md) appears atomically.
+Existing files are kept, so a stopped run continues. Val and test clips have frames of 320 x 240 as well. Look at
 some with `python -m export.clips.sheet` before you train on them.
 """
 

@@ -13,7 +13,7 @@ MAX_LOG_SCALE = math.log(1000.0 / 16)  # keeps exp() of a size delta finite
 
 
 def anchors(config: NetworkConfig, shapes: list[tuple[int, int]]) -> list[Tensor]:
-    """Anchors of each level, [h * w * A, 4] in the order row, column, ratio; offset 0 (docs/formats.md)."""
+    """Anchors of each level, [h * w * A, 4] in the order row, column, ratio; offset 0 (docs/reference/formats.md)."""
     levels = []
     for (height, width), stride, size in zip(shapes, config.rpn_strides, config.anchor_sizes, strict=True):
         ratio = torch.tensor(config.aspect_ratios)

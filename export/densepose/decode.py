@@ -30,8 +30,8 @@ DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
 
 @dataclass(frozen=True)
 class Graphs:
-    """The three callables; shapes as in docs/formats.md (the detector returns P2..P6, objectness, deltas, and the
-    evidence of people, if any)."""
+    """The three callables; shapes as in docs/reference/formats.md (the detector returns P2..P6, objectness, deltas, and
+    the evidence of people, if any)."""
 
     detector: Detector
     box_head: BoxHead

@@ -1,4 +1,4 @@
-"""Recordings of a depth camera (`maquette record`, docs/formats.md) with sizes measured by hand, as depth frames."""
+"""Recordings of a depth camera (docs/reference/formats.md) with sizes measured by hand, as depth frames."""
 
 from __future__ import annotations
 

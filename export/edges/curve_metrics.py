@@ -18,7 +18,7 @@ FARTHEST_R = 100.0  # what has nothing near it counts as so far away in Chamfer 
 
 
 def curves_of(document: Mapping) -> list[np.ndarray]:
-    """The polylines [n, 3] of a file of curves (docs/formats.md), camera coordinates in metres."""
+    """The polylines [n, 3] of a file of curves (docs/reference/formats.md), camera coordinates in metres."""
     return [np.asarray(curve["points"], np.float64).reshape(-1, 3) for curve in document["curves"]]
 
 

@@ -1,7 +1,7 @@
 """What becomes small: the distance's error, its own idea of it, and the kind of edge.
 
 The paper's histogram loss (arXiv 2011.15081, section 4.3 of its code's description) stands beside L1, L2 and a mixture
-of both on one distance a pixel; docs/edges.md has the comparison.
+of both on one distance a pixel; docs/research/edges.md has the comparison.
 """
 
 from __future__ import annotations

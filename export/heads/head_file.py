@@ -1,5 +1,5 @@
 """Head files (.maqh) in numpy: written and read, of version 1 read alone. The layout is that of
-sdk/src/head/files/file_format.h, version 2 (docs/formats.md)."""
+sdk/src/head/files/file_format.h, version 2 (docs/reference/formats.md)."""
 
 from __future__ import annotations
 

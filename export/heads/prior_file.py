@@ -1,5 +1,5 @@
 """Prior files (.maqp) in numpy: written and read. The layout is that of sdk/src/head/files/file_format.h, version 1
-(docs/formats.md).
+(docs/reference/formats.md).
 
 Bases are stored as float32, float16, or int8 with a scale for each row (their biases float16).
 """

@@ -1,5 +1,5 @@
 """Template files (.maqt) in numpy: written and read. The layout is that of sdk/src/head/files/file_format.h, version 1
-(docs/formats.md)."""
+(docs/reference/formats.md)."""
 
 from __future__ import annotations
 

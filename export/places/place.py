@@ -1,4 +1,4 @@
-"""Reads a place's folder (docs/formats.md): cameras, pictures and depth when asked for, the cloud."""
+"""Reads a place's folder (docs/reference/formats.md): cameras, pictures and depth when asked for, the cloud."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Codes of frames in a file (.maqc, docs/formats.md): the vectors that codes stand for, and how likely each code is by
+"""Codes of frames in a file (.maqc, docs/reference/formats.md): the vector of each code, and how likely the code is by
 itself and after the one before it.
 
 Probabilities are stored as bits, -log2 p, in steps of 1/16 up to 15.9, one byte each.

@@ -1,4 +1,4 @@
-"""Labelled views of solids, packed into shards (docs/formats.md). Reading them needs neither OpenCascade nor Embree."""
+"""Labelled views of solids, packed into shards (docs/reference/formats.md); read without OpenCascade and Embree."""
 
 from __future__ import annotations
 

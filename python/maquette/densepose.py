@@ -54,7 +54,7 @@ class DensePose(NativeObject):
 
     bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
     maq_densepose_config by their names: long_side_px, person_crops, key_frame_interval, threads, score_threshold, ...
-    (docs/dense-pose.md says what they gain and cost). Raises MaquetteError.
+    (docs/guide/dense-pose.md says what they gain and cost). Raises MaquetteError.
     """
 
     def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:

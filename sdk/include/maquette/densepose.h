@@ -195,7 +195,7 @@ MAQ_API maq_status maq_densepose_result_draw(const maq_densepose_result* result,
                                              const maq_densepose_drawing* drawing, uint8_t* rgba, size_t stride_bytes,
                                              size_t size_bytes);
 
-/* Writes three files in the DensePose convention (docs/formats.md):
+/* Writes three files in the DensePose convention (docs/reference/formats.md):
  *   <path>_IUV.png   channels I, U * 255, V * 255 in the file's order B, G, R
  *   <path>_INDS.png  MAQ_DENSEPOSE_PLANE_PERSON
  *   <path>.json      size, boxes, scores

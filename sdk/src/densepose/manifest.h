@@ -1,4 +1,4 @@
-// What a manifest says of dense pose (docs/formats.md), read and checked.
+// What a manifest says of dense pose (docs/reference/formats.md), read and checked.
 #pragma once
 
 #include <array>

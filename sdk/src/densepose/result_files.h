@@ -1,4 +1,4 @@
-// The files of a dense pose result, in the DensePose convention (docs/formats.md).
+// The files of a dense pose result, in the DensePose convention (docs/reference/formats.md).
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Where on the body a label lies: a bundle's surface.grid (docs/formats.md).
+// Where on the body a label lies: a bundle's surface.grid (docs/reference/formats.md).
 #pragma once
 
 #include <cstdint>

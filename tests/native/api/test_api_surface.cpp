@@ -60,7 +60,7 @@ TEST(ApiSurface, OfTheShippedBundleIsABody) {
   EXPECT_GT(left_hand.x_m, right_hand.x_m + 0.3) << "x goes to the body's left";
 }
 
-// The place of one node, from the file's bytes (docs/formats.md).
+// The place of one node, from the file's bytes (docs/reference/formats.md).
 TEST(ApiSurface, PointsAreThoseOfTheFile) {
   const maquette::Context context;
   const maquette::DensePose densepose(context, kShipped);

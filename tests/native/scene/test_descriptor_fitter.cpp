@@ -357,7 +357,7 @@ TEST_F(DescriptorFitter, ThreadsChangeNothing) {
   EXPECT_EQ(one.view_dependence, three.view_dependence);
 }
 
-// The extractor of this bundle is small; what the real one takes is in docs/scenes.md.
+// The extractor of this bundle is small; what the real one takes is in docs/research/scenes.md.
 TEST_F(DescriptorFitter, AMillionSeenPointsTakeLessThan450MB) {
   constexpr int kWidth = 500, kHeight = 500;
   maq::PinholeCamera camera;

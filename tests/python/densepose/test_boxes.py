@@ -1,4 +1,4 @@
-"""Anchors, box deltas and feature levels are those of docs/formats.md."""
+"""Anchors, box deltas and feature levels are those of docs/reference/formats.md."""
 
 import math
 

@@ -1,6 +1,6 @@
 """Stiff cases for the network that is shipped, on depth that can be written down: planes, steps, round things, creases.
 
-Where the network does not keep what is aimed at, the bound is what it reaches (docs/edges.md, "Stiff cases").
+Where the network does not keep what is aimed at, the bound is what it reaches (docs/research/edges.md, "Stiff cases").
 """
 
 from pathlib import Path

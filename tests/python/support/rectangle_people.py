@@ -38,7 +38,7 @@ def picture(rng: np.random.Generator, width=192, height=160, people=2) -> tuple[
 
 
 def write_shard(folder: Path, images: int, seed: int = 0) -> None:
-    """Writes `folder/shard-00000.npz` with what training reads (docs/formats.md)."""
+    """Writes `folder/shard-00000.npz` with what training reads (docs/reference/formats.md)."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True)
     shard = ShardWriter(boxes=False)

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[3]
 STAGE = ROOT / "build/release/stage"
 DEMO, MAQUETTE = STAGE / "bin/maquette-demo", STAGE / "bin/maquette"
 
-_FRAME_HEAD = struct.Struct("<IIqQIiiiiIQQ")  # docs/formats.md, recording
+_FRAME_HEAD = struct.Struct("<IIqQIiiiiIQQ")  # docs/reference/formats.md, recording
 _BGR8, _RGB8 = 2, 1
 
 

@@ -1,4 +1,4 @@
-// One fitted head in a file (.maqh, docs/formats.md).
+// One fitted head in a file (.maqh, docs/reference/formats.md).
 #pragma once
 
 #include <cstddef>

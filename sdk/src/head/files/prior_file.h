@@ -1,4 +1,4 @@
-// The prior of heads in a file of a bundle (.maqp, docs/formats.md). export/heads/prior_file.py writes it.
+// The prior of heads in a file of a bundle (.maqp, docs/reference/formats.md). export/heads/prior_file.py writes it.
 #pragma once
 
 #include <cstddef>

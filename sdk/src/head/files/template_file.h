@@ -1,4 +1,4 @@
-// The template head in a file of a bundle (.maqt, docs/formats.md). export/heads/template_file.py writes it.
+// The template head in a file of a bundle (.maqt, docs/reference/formats.md). export/heads/template_file.py writes it.
 #pragma once
 
 #include <cstddef>

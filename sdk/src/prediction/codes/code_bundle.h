@@ -1,5 +1,5 @@
-// What a bundle for prediction has (docs/formats.md): the graphs that make a frame codes and codes a frame, and what
-// codes stand for.
+// What a bundle for prediction has (docs/reference/formats.md): the graphs that make a frame codes and codes a frame,
+// and what codes stand for.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// Scenes on disk: .maqs, mapped into memory when it is opened (docs/formats.md).
+// Scenes on disk: .maqs, mapped into memory when it is opened (docs/reference/formats.md).
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// The three networks of scenes, from a bundle (docs/formats.md): the extractor makes features of photos, the view basis
-// says how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
+// The three networks of scenes, from a bundle (docs/reference/formats.md): the extractor makes features of photos, the
+// view basis says how descriptors depend on the viewing direction, the refiner makes images of descriptor rasters.
 #pragma once
 
 #include <array>

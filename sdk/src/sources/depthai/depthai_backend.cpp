@@ -21,7 +21,7 @@ DepthAiDriver* open_driver() {
   setenv("DEPTHAI_TELEMETRY", "0", 0);
   return static_cast<DepthAiDriver*>(open_module(
       kFile, kDepthAiSymbol, "DepthAI cameras need",
-      "Build it with -DMAQ_WITH_DEPTHAI=ON (docs/cameras/depthai.md) and install it beside libmaquette.so."));
+      "Build it with -DMAQ_WITH_DEPTHAI=ON (docs/reference/cameras/depthai.md) and install it beside libmaquette.so."));
 }
 
 DepthAiDriver& driver() {

@@ -61,7 +61,7 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
         return sorted[low] + (sorted[high] - sorted[low]) * (at - low)
     }
 
-    /** An entry of `cases` (docs/formats.md, "Benchmarks"). */
+    /** An entry of `cases` (docs/reference/formats.md, "Benchmarks"). */
     fun json(): JSONObject {
         val s = stats!!
         val seconds = times.last().sum() / 1000

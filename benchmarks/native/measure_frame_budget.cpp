@@ -28,12 +28,13 @@ struct Run {
   std::promise<std::string> end;  // why there are no more frames, "" after the last
 
   void take(const maquette::PipelineResult& result) {
-    const maq_densepose_stats stats = result.densepose.stats();
+    const maquette::DensePoseResult densepose = maquette::densepose_of(result);
+    const maq_densepose_stats stats = densepose.stats();
     frames.push_back({result.run_ms, std::max(stats.network_width_px, stats.network_height_px), stats.is_key_frame});
     size_t stride = 0;
-    const uint8_t* const parts = result.densepose.plane(MAQ_DENSEPOSE_PLANE_PART, &stride);
-    for (int y = 0; y < result.densepose.height_px(); ++y) {
-      labels.write(reinterpret_cast<const char*>(parts + size_t(y) * stride), result.densepose.width_px());
+    const uint8_t* const parts = densepose.plane(MAQ_DENSEPOSE_PLANE_PART, &stride);
+    for (int y = 0; y < densepose.height_px(); ++y) {
+      labels.write(reinterpret_cast<const char*>(parts + size_t(y) * stride), densepose.width_px());
     }
   }
 };
@@ -49,16 +50,17 @@ int main(int argc, char** argv) try {
   Run run;
   run.labels.open(argv[4], std::ios::binary);
   maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &model;
-  config.frame_budget_ms = std::atof(argv[3]);
   config.result_user_data = config.state_user_data = &run;
-  config.result_callback = [](void* to, const maq_pipeline_result* result) {
-    static_cast<Run*>(to)->take(maquette::PipelineResult(*result));
+  config.result_callback = [](void* to, maq_pipeline_result* result) {
+    static_cast<Run*>(to)->take(maquette::PipelineResult(result));
   };
   config.state_callback = [](void* to, maq_pipeline_state state, maq_status, const char* why) {
     if (state == MAQ_PIPELINE_ENDED || state == MAQ_PIPELINE_FAILED) static_cast<Run*>(to)->end.set_value(why);
   };
   maquette::Pipeline pipeline(context, config);
+  maquette::DensePoseModel people(context, model);
+  people.set_frame_budget(std::atof(argv[3]));
+  pipeline.set_model(people);
   pipeline.set_source(argv[2]);
   const std::string problem = run.end.get_future().get();
   if (!problem.empty()) throw std::runtime_error(problem);

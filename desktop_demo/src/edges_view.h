@@ -37,7 +37,7 @@ class EdgesView final : public LiveView {
   void draw_model_options();
   void draw_formats();
 
-  maquette::EdgesModel model_;
+  maquette::LiveEdgesOptions model_;
   std::atomic<maquette::EdgeLayer> layer_;  // that the pipeline's thread draws
   maquette::RgbaImage redrawn_;             // of a frame that was drawn as another layer
   maquette::EdgesPick pick_;                // at the pointer, of the frame that was drawn last

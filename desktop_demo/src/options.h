@@ -41,7 +41,7 @@ struct Options {
   std::string bundle;
   maquette::EdgeLayer layer = maquette::EdgeLayer::kDepth;
   std::string edges_bundle;
-  maquette::EdgesModel edges_model;
+  maquette::LiveEdgesOptions edges_model;
   maq_densepose_config model = maquette::default_densepose_config();
   maquette::LiveOptions live;
   int width_px = 1280, height_px = 800;

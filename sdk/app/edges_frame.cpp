@@ -20,8 +20,9 @@ double distance_to_segment(const Pixel& p, const Pixel& a, const Pixel& b) {
 void EdgesFrame::take(PipelineResult from, double rate, EdgeLayer of_layer) {
   curves.clear(), corners.clear(), boxes.clear();
   curves_stats = {};
-  result = std::make_shared<EdgesResult>(std::move(*from.edges));
-  found = from.curves ? std::make_shared<EdgesCurves>(std::move(*from.curves)) : nullptr;
+  result = std::make_shared<EdgesResult>(std::move(*edges_of(from)));
+  std::optional<EdgesCurves> found_curves = curves_of(from);
+  found = found_curves ? std::make_shared<EdgesCurves>(std::move(*found_curves)) : nullptr;
   if (found != nullptr) {
     curves = found->curves();
     corners = found->corners();

@@ -20,20 +20,37 @@ class LiveDensePose : public LivePipeline {
   LiveDensePose(const Context& context, const maq_densepose_config& config,
                 std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change = nullptr,
                 const LiveOptions& options = {})
-      : LivePipeline(context, running(config), std::move(on_result), std::move(on_change), options) {}
+      : LiveDensePose(context, DensePoseModel(context, config), std::move(on_result), std::move(on_change), options) {}
 
   // Loads the model with other options; a photo is mapped again. Returns at once.
-  void set_model(const maq_densepose_config& config) { pipeline().set_densepose(config); }
-  void set_roll(float roll_rad) { pipeline().set_roll(roll_rad); }
-  // Nothing until a model is loaded that has one.
-  std::optional<maq_densepose_surface> surface() const { return pipeline().surface(); }
+  void set_model(const maq_densepose_config& config) {
+    DensePoseModel model(context_, config);
+    model.set_roll(roll_rad_);
+    model.set_frame_budget(frame_budget_ms_);
+    pipeline().set_model(model);
+    model_ = std::move(model);
+  }
+  void set_roll(float roll_rad) {
+    roll_rad_ = roll_rad;
+    model_.set_roll(roll_rad);
+  }
+  // Returns nothing before a model is loaded that has one. The points are valid until set_model().
+  std::optional<maq_densepose_surface> surface() const { return model_.surface(); }
 
  private:
-  static maq_pipeline_config running(const maq_densepose_config& config) {
-    maq_pipeline_config model = default_pipeline_config();
-    model.densepose = &config;
-    return model;
+  LiveDensePose(const Context& context, DensePoseModel model, std::function<void(PipelineResult, double)> on_result,
+                std::function<void()> on_change, const LiveOptions& options)
+      : LivePipeline(context, model, std::move(on_result), std::move(on_change), options),
+        context_(context),
+        model_(std::move(model)),
+        frame_budget_ms_(options.frame_budget_ms) {
+    model_.set_frame_budget(frame_budget_ms_);
   }
+
+  const Context& context_;
+  DensePoseModel model_;
+  const double frame_budget_ms_;
+  float roll_rad_ = 0;
 };
 
 }  // namespace maquette

@@ -14,8 +14,8 @@
 
 namespace maquette {
 
-// What runs, and what is left out.
-struct EdgesModel {
+// The options of the model, and the parts that run.
+struct LiveEdgesOptions {
   maq_edges_config edges = default_edges_config();
   bool finds_curves = true;
   bool finds_boxes = true;  // among the curves
@@ -23,33 +23,23 @@ struct EdgesModel {
 
 class LiveEdges : public LivePipeline {
  public:
-  LiveEdges(const Context& context, const EdgesModel& model, std::function<void(PipelineResult, double)> on_result,
-            std::function<void()> on_change = nullptr, const LiveOptions& options = {})
-      : LiveEdges(context, model, curves_of(model), std::move(on_result), std::move(on_change), options) {}
+  LiveEdges(const Context& context, const LiveEdgesOptions& model,
+            std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change = nullptr,
+            const LiveOptions& options = {})
+      : LivePipeline(context, model_of(context, model), std::move(on_result), std::move(on_change), options),
+        context_(context) {}
 
   // Loads the model with other options; edges of a depth image are found again. Returns at once.
-  void set_model(const EdgesModel& model) {
-    const maq_edges_curves_config curves = curves_of(model);
-    pipeline().set_edges(model.edges, model.finds_curves ? &curves : nullptr);
-  }
+  void set_model(const LiveEdgesOptions& model) { pipeline().set_model(model_of(context_, model)); }
 
  private:
-  LiveEdges(const Context& context, const EdgesModel& model, const maq_edges_curves_config& curves,
-            std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change,
-            const LiveOptions& options)
-      : LivePipeline(context, running(model, curves), std::move(on_result), std::move(on_change), options) {}
-
-  static maq_edges_curves_config curves_of(const EdgesModel& model) {
+  static EdgesModel model_of(const Context& context, const LiveEdgesOptions& model) {
     maq_edges_curves_config curves = default_edges_curves_config();
     curves.find_boxes = model.finds_boxes ? 1 : 0;
-    return curves;
+    return EdgesModel(context, model.edges, model.finds_curves ? &curves : nullptr);
   }
-  static maq_pipeline_config running(const EdgesModel& model, const maq_edges_curves_config& curves) {
-    maq_pipeline_config running = default_pipeline_config();
-    running.edges = &model.edges;
-    running.curves = model.finds_curves ? &curves : nullptr;
-    return running;
-  }
+
+  const Context& context_;
 };
 
 }  // namespace maquette

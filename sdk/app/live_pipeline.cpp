@@ -19,7 +19,7 @@ std::string source_uri(const std::string& path_or_uri) {
   return uri;
 }
 
-LivePipeline::LivePipeline(const Context& context, maq_pipeline_config model,
+LivePipeline::LivePipeline(const Context& context, const Model& model,
                            std::function<void(PipelineResult, double)> on_result, std::function<void()> on_change,
                            const LiveOptions& options)
     : on_result_(std::move(on_result)), on_change_(std::move(on_change)), max_results_(options.max_results) {
@@ -27,18 +27,19 @@ LivePipeline::LivePipeline(const Context& context, maq_pipeline_config model,
   source.reconnect_ms = options.reconnect_ms;
   source.real_time = source.loop = options.real_time ? 1 : 0;
   source.max_side_px = options.max_side_px;
-  model.source = &source;
-  model.result_pool_size = kResultsHeld;
-  model.nice = options.nice;
-  model.frame_budget_ms = options.frame_budget_ms;
-  model.result_user_data = model.state_user_data = this;
-  model.result_callback = [](void* self, const maq_pipeline_result* result) {
-    static_cast<LivePipeline*>(self)->take_result(PipelineResult(*result));
+  maq_pipeline_config config = default_pipeline_config();
+  config.source = &source;
+  config.result_pool_size = kResultsHeld;
+  config.nice = options.nice;
+  config.result_user_data = config.state_user_data = this;
+  config.result_callback = [](void* self, maq_pipeline_result* result) {
+    static_cast<LivePipeline*>(self)->take_result(PipelineResult(result));
   };
-  model.state_callback = [](void* self, maq_pipeline_state state, maq_status, const char* problem) {
+  config.state_callback = [](void* self, maq_pipeline_state state, maq_status, const char* problem) {
     static_cast<LivePipeline*>(self)->take_state(state, problem);
   };
-  pipeline_.emplace(context, model);
+  pipeline_.emplace(context, config);
+  pipeline_->set_model(model);
 }
 
 // Here, so that no callback runs when other members go. By the C function, which does not throw.

@@ -33,7 +33,7 @@ struct LiveOptions {
   int32_t reconnect_ms = 86400000;  // how long a lost camera is waited for
   int32_t max_side_px = 2048;       // larger pictures of files are made smaller
   int32_t nice = 5;                 // so that the thread that draws goes first
-  double frame_budget_ms = 0;       // as in maq_pipeline_config
+  double frame_budget_ms = 0;       // of dense pose (maq_densepose_model_set_frame_budget)
 };
 
 // These return at once, unless they say otherwise; what goes wrong is in status().
@@ -53,10 +53,9 @@ class LivePlayer {
 
 class LivePipeline : public LivePlayer {
  public:
-  // `model`: what runs, densepose or edges with curves; the other fields are set here. `on_result` is called on the
-  // pipeline's thread with each result and how many there are a second; `on_change`, which may be null, on that thread
-  // with each change of the status. Neither may throw or destroy this.
-  LivePipeline(const Context& context, maq_pipeline_config model, std::function<void(PipelineResult, double)> on_result,
+  // The pipeline's thread calls `on_result` with each result and the results a second. It calls `on_change`, which may
+  // be null, with each change of the status. Neither may throw or destroy this.
+  LivePipeline(const Context& context, const Model& model, std::function<void(PipelineResult, double)> on_result,
                std::function<void()> on_change, const LiveOptions& options);
   ~LivePipeline() override;
   LivePipeline(const LivePipeline&) = delete;

@@ -8,12 +8,13 @@ namespace maquette {
 void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
   const auto before = std::chrono::steady_clock::now();
   camera.copy_from(mapped.frame);
+  DensePoseResult densepose = densepose_of(mapped);
   iuv.resize(camera.rgba.size());
   const maq_densepose_plane planes[] = {MAQ_DENSEPOSE_PLANE_PART, MAQ_DENSEPOSE_PLANE_U, MAQ_DENSEPOSE_PLANE_V,
                                         MAQ_DENSEPOSE_PLANE_PERSON};
   for (size_t channel = 0; channel < 4; ++channel) {
     size_t stride_bytes = 0;
-    const uint8_t* from = mapped.densepose.plane(planes[channel], &stride_bytes);
+    const uint8_t* from = densepose.plane(planes[channel], &stride_bytes);
     uint8_t* to = iuv.data() + channel;
     for (int y = 0; y < camera.height_px; ++y, from += stride_bytes) {
       for (int x = 0; x < camera.width_px; ++x, to += 4) *to = from[x];
@@ -28,8 +29,8 @@ void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint
     (*seen_before)[(chart * kSeenCells + v) * kSeenCells + u] = 255;
   }
   seen = *seen_before;
-  people = mapped.densepose.people();
-  result = std::make_shared<DensePoseResult>(std::move(mapped.densepose));
+  people = densepose.people();
+  result = std::make_shared<DensePoseResult>(std::move(densepose));
   stats = result->stats();
   number = mapped.number;
   results_per_second = rate;

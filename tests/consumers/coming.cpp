@@ -11,14 +11,14 @@ int main(int argc, char** argv) try {
   }
   const double ahead_s = argc > 3 ? std::atof(argv[3]) : 0.1;
   const maquette::Context context;
-  maquette::Pipeline pipeline(context, maquette::default_pipeline_config());
+  maquette::Pipeline pipeline(context);
   const maquette::Surprise surprise(context);
-  pipeline.set_prediction(maquette::Predictor(context), ahead_s, &surprise);
+  pipeline.set_model(maquette::PredictionModel(context, maquette::Predictor(context), ahead_s, &surprise));
   pipeline.set_source(argv[1]);
   unsigned long long events = 0;
   while (const auto result = pipeline.next()) {
-    result->predicted->save(argv[2]);  // with a mark in the file
-    events += result->is_event ? 1 : 0;
+    maquette::predicted_frame_of(*result)->save(argv[2]);  // with a mark in the file
+    events += maquette::novelty_of(*result)->is_event == 1 ? 1 : 0;
   }
   std::printf("%.0f ms ahead, %llu events\n", 1e3 * ahead_s, events);
   return 0;

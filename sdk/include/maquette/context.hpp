@@ -27,10 +27,20 @@ inline void check(maq_status status) {
 
 template <class Handle, void (*destroy)(Handle*)>
 struct HandleDeleter {
-  void operator()(Handle* handle) const noexcept { destroy(handle); }
+  void operator()(Handle* handle) const noexcept {
+    if (whole == nullptr) destroy(handle);
+  }
+  std::shared_ptr<const void> whole;  // the object that the handle is a part of, which stays alive; nullptr: none
 };
 template <class Handle, void (*destroy)(Handle*)>
 using Owner = std::unique_ptr<Handle, HandleDeleter<Handle, destroy>>;
+
+// A handle inside another object, which lives at least as long.
+template <class Handle>
+struct PartOf {
+  const Handle* handle;
+  std::shared_ptr<const void> whole;
+};
 
 inline maq_context_config default_context_config() {
   maq_context_config config;

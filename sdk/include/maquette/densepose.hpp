@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "maquette/densepose.h"
@@ -23,6 +24,11 @@ class DensePoseResult {
   // Takes over a result of the C API.
   explicit DensePoseResult(maq_densepose_result* result) : owner_(result) {
     if (result != nullptr) check(maq_densepose_result_get_size(get(), &width_px_, &height_px_));
+  }
+  // Refers to the output in a pipeline's result.
+  explicit DensePoseResult(PartOf<maq_densepose_result> part)
+      : owner_(const_cast<maq_densepose_result*>(part.handle), {std::move(part.whole)}) {
+    if (get() != nullptr) check(maq_densepose_result_get_size(get(), &width_px_, &height_px_));
   }
 
   maq_densepose_result* get() const { return owner_.get(); }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "maquette/edge_curves.h"
@@ -36,6 +37,9 @@ class EdgesCurves {
  public:
   // Takes over curves of the C API.
   explicit EdgesCurves(maq_edges_curves* curves) : owner_(curves) {}
+  // Refers to the curves in a pipeline's result.
+  explicit EdgesCurves(PartOf<maq_edges_curves> part)
+      : owner_(const_cast<maq_edges_curves*>(part.handle), {std::move(part.whole)}) {}
 
   maq_edges_curves* get() const { return owner_.get(); }
 
@@ -90,9 +94,11 @@ class EdgesCurves {
 class EdgesResult {
  public:
   // Takes over a result of the C API.
-  explicit EdgesResult(maq_edges_result* result) : owner_(result) {
-    field_.struct_size = sizeof field_;
-    check(maq_edges_result_get_field(get(), &field_));
+  explicit EdgesResult(maq_edges_result* result) : owner_(result) { read_field(); }
+  // Refers to the output in a pipeline's result.
+  explicit EdgesResult(PartOf<maq_edges_result> part)
+      : owner_(const_cast<maq_edges_result*>(part.handle), {std::move(part.whole)}) {
+    read_field();
   }
 
   maq_edges_result* get() const { return owner_.get(); }
@@ -130,6 +136,11 @@ class EdgesResult {
   }
 
  private:
+  void read_field() {
+    field_.struct_size = sizeof field_;
+    check(maq_edges_result_get_field(get(), &field_));
+  }
+
   const void* plane(maq_edges_plane which) const {
     const void* values = nullptr;
     size_t stride_bytes = 0;

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "maquette/context.hpp"
 #include "maquette/frame.h"
@@ -14,6 +15,8 @@ class Frame {
  public:
   // Takes over a frame of the C API.
   explicit Frame(maq_frame* frame) : owner_(frame) {}
+  // Refers to the frame of a pipeline's result.
+  explicit Frame(PartOf<maq_frame> part) : owner_(const_cast<maq_frame*>(part.handle), {std::move(part.whole)}) {}
 
   // Pixels of the app, which must stay until the frame is gone.
   Frame(const Context& context, const maq_frame_desc& desc) {

@@ -15,12 +15,15 @@
 
 #include "maquette/context.hpp"
 #include "maquette/densepose.hpp"
+#include "maquette/densepose_model.hpp"
 #include "maquette/edges.hpp"
+#include "maquette/edges_model.hpp"
 #include "maquette/frame.hpp"
 #include "maquette/head.hpp"
 #include "maquette/maquette.h"
 #include "maquette/pipeline.hpp"
 #include "maquette/prediction.hpp"
+#include "maquette/prediction_model.hpp"
 #include "maquette/scene.hpp"
 #include "maquette/source.hpp"
 

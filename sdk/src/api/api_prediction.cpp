@@ -9,7 +9,7 @@
 #include "api/source_handle.h"
 #include "core/worker_threads.h"
 #include "maquette/concealer.h"
-#include "pipeline/concealer.h"
+#include "concealment/concealer.h"
 
 using namespace maq;
 

@@ -26,6 +26,15 @@ class Handle {
     std::lock_guard<std::mutex> lock(mutex_);
     error_ = std::move(text);
   }
+  // For a handle that is a part of another.
+  void set_held(bool is_held) const noexcept {
+    if (is_held) {
+      set_error({});
+      state_.lend_part();
+    } else {
+      state_.take_back_part();
+    }
+  }
   std::string error() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return error_;

@@ -20,8 +20,8 @@ constexpr const char* kKinds[] = {
     "a maq_capture",      "a maq_scene",         "a maq_scene_builder", "a maq_scene_renderer",   "a maq_scene_image",
     "a maq_edges",        "a maq_edges_result",  "a maq_edges_curves",  "a maq_edges_fusion",     "a maq_head",
     "a maq_head_builder", "a maq_head_renderer", "a maq_head_image",    "a maq_predictor",        "a maq_concealer",
-    "a maq_surprise"};
-static_assert(std::size(kKinds) == size_t(HandleKind::kSurprise) + 1);
+    "a maq_surprise",     "a maq_model",         "a maq_pipeline_result"};
+static_assert(std::size(kKinds) == size_t(HandleKind::kPipelineResult) + 1);
 
 // The latest handles that are gone. Without a destructor: an app may destroy handles while the process ends.
 struct RetiredHandles {
@@ -58,6 +58,9 @@ void HandleState::refuse(HandleKind kind, const char* name) const {
     throw ArgumentError(name, " is not ", wanted, ", nor another object of this library.");
   }
   if (found != size_t(kind)) throw ArgumentError(name, " is ", kKinds[found], ", but must be ", wanted, ".");
+  if ((word & (kPart | kGivenBack)) == kPart) {
+    throw ArgumentError(name, " belongs to a result of a pipeline; release that with maq_pipeline_result_release.");
+  }
   throw ArgumentError(name, " is ", wanted, " that was given back before; use it no more, and give it back once.");
 }
 

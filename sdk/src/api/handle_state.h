@@ -35,7 +35,9 @@ enum class HandleKind : uint32_t {
   kHeadImage,
   kPredictor,
   kConcealer,
-  kSurprise
+  kSurprise,
+  kModel,
+  kPipelineResult
 };
 
 class HandleState {
@@ -44,7 +46,9 @@ class HandleState {
 
   // Of any kind.
   bool is_held() const;
-  bool is_held_as(HandleKind kind) const { return (word_.load(std::memory_order_relaxed) & ~kInUse) == held(kind); }
+  bool is_held_as(HandleKind kind) const { 
+    return (word_.load(std::memory_order_relaxed) & ~(kInUse | kPart)) == held(kind);
+  }
   // In a child of fork(), the objects of the parent have no threads, their mutexes may be locked for good, and their
   // files and devices are the parent's: nothing may touch them.
   bool is_of_parent() const { return has_mark() && forks_ != fork_count(); }
@@ -53,7 +57,7 @@ class HandleState {
 
   // For calls that run one at a time on a handle: false when another runs, or the handle is of another kind.
   bool begin_call(HandleKind kind) {
-    uint32_t expected = held(kind);
+    uint32_t expected = held(kind) | (word_.load(std::memory_order_relaxed) & kPart);
     return word_.compare_exchange_strong(expected, expected | kInUse, std::memory_order_acquire,
                                          std::memory_order_relaxed);
   }
@@ -64,6 +68,12 @@ class HandleState {
   bool mark_returned(HandleKind kind, bool even_in_use, bool& is_in_use);
   // To the app, from a pool.
   void lend() { word_.fetch_and(~(kGivenBack | kInUse), std::memory_order_relaxed); }
+  // For a handle inside another: the app has it and gives it back with the whole; it cannot give back the part alone.
+  void lend_part() {
+    word_.fetch_or(kPart, std::memory_order_relaxed);
+    lend();
+  }
+  void take_back_part() { word_.fetch_or(kPart | kGivenBack, std::memory_order_relaxed); }
 
   // Takes the memory of a handle that is gone. It is kept for a while, with a state at its beginning that says so: for
   // an app that still has the address.
@@ -75,7 +85,7 @@ class HandleState {
   bool has_mark() const { return (word_.load(std::memory_order_relaxed) & kMarkBits) == kMark; }
 
   static constexpr uint32_t kMark = 0x4d510000, kMarkBits = 0xffff0000;  // unlike what memory is often filled with
-  static constexpr uint32_t kInUse = 1, kGivenBack = 2;
+  static constexpr uint32_t kInUse = 1, kGivenBack = 2, kPart = 4;
   static constexpr uint32_t held(HandleKind kind) { return kMark | uint32_t(kind) << 8; }
 
   std::atomic<uint32_t> word_;

@@ -240,7 +240,7 @@ void DensePose::reset() {
   tracks_crops_ = false;
 }
 
-void DensePose::set_effort(int key_frame_interval, int long_side_px) {
+void DensePose::set_quality(int key_frame_interval, int long_side_px) {
   if (long_side_px != settings_.long_side_px) reset();  // boxes are followed in pixels of the network's input
   settings_.key_frame_interval = key_frame_interval;
   settings_.long_side_px = long_side_px;

@@ -99,7 +99,7 @@ class DensePose {
   int key_frame_interval() const { return settings_.key_frame_interval; }
   // Between two runs: takes effect with the next, which is a key frame where the long side changes. No network is made
   // anew, unless another provider than the CPU runs them.
-  void set_effort(int key_frame_interval, int long_side_px);
+  void set_quality(int key_frame_interval, int long_side_px);
 
   // From any thread: the pictures of the next runs show the world rotated clockwise by `rad`, -7 to 7. The
   // networks see them rotated upright, by steps of kRollStepRad; where the step changes, a key frame begins.

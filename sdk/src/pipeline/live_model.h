@@ -1,78 +1,77 @@
-// What a pipeline runs on each frame: dense pose, edges with their curves, or what comes next and surprise.
+// The interface of a model that a pipeline runs on each frame. The API's adapters implement it for each system; the
+// pipeline knows no system.
 #pragma once
 
-#include <functional>
+#include <condition_variable>
 #include <memory>
-#include <optional>
-#include <variant>
+#include <mutex>
 
 #include "core/frame.h"
-#include "densepose/densepose.h"
-#include "edges/edges.h"
-#include "edges/measuring/curve_finder.h"
-#include "nn/bundle.h"
-#include "nn/onnxruntime_library.h"
-#include "pipeline/frame_budget.h"
-#include "prediction/networks/network_predictor.h"
-#include "prediction/predictor.h"
-#include "prediction/surprise/surprise.h"
+#include "maquette/source.h"
 
 namespace maq {
 
-struct LiveEdgesSettings {
-  EdgesSettings edges;
-  std::optional<CurveRequest> curves;  // nothing: the field alone
+// The output of a model for one frame. Each model derives its own.
+class LiveOutput {
+ public:
+  virtual ~LiveOutput() = default;
+  // Tells handles inside the output that the app holds them from now on, or no longer.
+  virtual void set_held(bool /*is_held*/) noexcept {}
 };
 
-class LiveModel;
+// Returns `output` as a T; replaces an output of another model by a new T. Keeps the memory of outputs that fit.
+template <class T>
+T& reuse_output(std::unique_ptr<LiveOutput>& output) {
+  auto* fitting = dynamic_cast<T*>(output.get());
+  if (fitting == nullptr) {
+    auto made = std::make_unique<T>();
+    fitting = made.get();
+    output = std::move(made);
+  }
+  return *fitting;
+}
 
-struct PipelineModel {
-  std::function<Bundle()> read_bundle;  // on the thread
-  std::variant<DensePoseSettings, LiveEdgesSettings> settings;
-  std::shared_ptr<LiveModel> made;  // instead of these, where no bundle is to be read
-};
+class LiveModelUse;
 
-// A stream's own, of one pipeline; networks may be shared.
-struct LivePredictionSettings {
-  std::unique_ptr<Predictor> predictor;          // or:
-  std::unique_ptr<NetworkPredictor> by_network;  // one of these
-  int64_t ahead_ns = 0;
-  std::unique_ptr<Surprise> surprise;  // null: not found
-  float event_ratio = 0;
-};
-
-enum class LiveModelKind { kDensePose, kEdges, kPrediction };
-
-// Of one of the models; the rest is as it was.
-struct PipelineOutput {
-  DensePoseResult densepose;
-  EdgesResult edges;
-  FoundCurves curves;
-  Frame predicted;
-  SurpriseScore surprise;
-  LiveModelKind kind = LiveModelKind::kDensePose;
-  bool has_curves = false, has_surprise = false, is_event = false;
-};
-
-class LiveModel {
+class LiveModel : public std::enable_shared_from_this<LiveModel> {
  public:
   virtual ~LiveModel() = default;
 
-  // `camera`: of the source, nullptr where it does not say. Memory of `output` is reused.
-  virtual void run(const Frame& frame, const maq_intrinsics* camera, PipelineOutput& output) = 0;
-  virtual void set_roll(float /*rad*/) {}    // of the next frames' pictures
-  virtual void cancel() noexcept {}          // from any thread
-  virtual void forget() {}                   // the source before
-  virtual int threads() const { return 0; }  // in use, of what has a bundle
-  // What it does for a frame; of a model that cannot do less, 0 and 0.
-  virtual FrameEffort effort() const { return {0, 0}; }
-  virtual void set_effort(const FrameEffort&) {}
-  // Throws MAQ_ERROR_UNSUPPORTED where labels refer to no surface.
-  virtual const SurfaceGrid& surface();
+  // The pipeline's thread calls load() before the first run(). A second load() loads everything again.
+  virtual void load() {}
+  virtual void unload() noexcept {}
+  // `camera`: intrinsics of the source; nullptr if unknown. Reuses the memory of `output`.
+  virtual void run(const Frame& frame, const maq_intrinsics* camera, std::unique_ptr<LiveOutput>& output) = 0;
+  virtual void reset() {}            // the next frame begins a new stream
+  virtual void cancel() noexcept {}  // from any thread: ends the current run
+
+  // Reserves the model for one pipeline until the last copy of the returned pointer is gone. Returns the same use for
+  // the same pipeline. Throws MAQ_ERROR_INVALID_ARGUMENT if another pipeline runs the model.
+  std::shared_ptr<LiveModelUse> use_for(const void* pipeline);
+
+ private:
+  friend LiveModelUse;
+
+  std::mutex mutex_;  // of the rest
+  std::condition_variable changed_;
+  LiveModelUse* use_ = nullptr;
 };
 
-std::shared_ptr<LiveModel> make_live_model(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle,
-                                           const PipelineModel& model);
-std::shared_ptr<LiveModel> make_live_prediction(LivePredictionSettings settings);
+// Unloads the model at its end.
+class LiveModelUse : public std::enable_shared_from_this<LiveModelUse> {
+ public:
+  LiveModelUse(std::shared_ptr<LiveModel> model, const void* pipeline)
+      : model_(std::move(model)), pipeline_(pipeline) {}
+  ~LiveModelUse();
+  LiveModelUse(const LiveModelUse&) = delete;
+  LiveModelUse& operator=(const LiveModelUse&) = delete;
+
+  LiveModel* operator->() const { return model_.get(); }
+  const void* pipeline() const { return pipeline_; }
+
+ private:
+  const std::shared_ptr<LiveModel> model_;
+  const void* const pipeline_;
+};
 
 }  // namespace maq

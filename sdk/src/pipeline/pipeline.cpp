@@ -11,9 +11,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
-#include <list>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -24,7 +22,6 @@
 #include "core/error.h"
 #include "core/thread.h"
 #include "core/trace/trace_section.h"
-#include "nn/bundle.h"
 #include "sources/recording/recording.h"
 #include "sources/registry.h"
 
@@ -70,27 +67,21 @@ class EventRate {
   size_t count_ = 0;
 };
 
-// Of the same bytes: points outside of a chart are NaN.
-bool is_same(const SurfaceGrid& one, const SurfaceGrid& other) {
-  return one.nodes == other.nodes &&
-         std::memcmp(one.points_m.data(), other.points_m.data(), one.points_m.size() * sizeof one.points_m[0]) == 0;
-}
-
-// What callers ask for. The numbers count the changes.
+// The latest wishes of callers. The numbers count the changes.
 struct Request {
   std::string uri;  // "": no source
-  PipelineModel model;
+  std::shared_ptr<LiveModelUse> model;  // nullptr: none runs
   std::string recording;
   uint64_t source_number = 0, model_number = 1, recording_number = 0;
 };
 
 }  // namespace
 
-// What the pipeline and its thread share. The thread may outlive the pipeline.
+// The state that the pipeline and its thread share. The thread may outlive the pipeline.
 struct Pipeline::State {
   const PipelineSettings settings;
 
-  mutable std::mutex mutex;  // of what follows, to the next such line
+  mutable std::mutex mutex;  // of the members down to "Of the thread alone"
   std::condition_variable changed;
   Request request;
   uint64_t request_number = 0;
@@ -109,12 +100,9 @@ struct Pipeline::State {
   std::deque<PipelineStatus> reports;
   bool has_result = false;
   Frame newest_frame;
-  PipelineOutput newest_output;
+  std::unique_ptr<LiveOutput> newest_output;
   PipelineStats counts;
-  std::shared_ptr<LiveModel> model;  // none before the first is loaded; networks are run by the thread alone
-  std::list<SurfaceGrid> surfaces;   // that were asked for
-
-  std::atomic<float> roll_rad{0};
+  std::shared_ptr<LiveModelUse> model;  // the one that is loaded; the thread alone runs it
 
   // Of the thread alone. Source and model are done when their numbers are those of the request.
   Request now;
@@ -125,14 +113,13 @@ struct Pipeline::State {
   std::unique_ptr<RecordingWriter> recording;
   uint64_t recording_number = 0;
   Frame frame;
-  PipelineOutput output;
+  std::unique_ptr<LiveOutput> output;
   std::optional<Clock::time_point> waiting_since;
   EventRate rate;
-  std::optional<FrameBudget> budget;  // of the model that is loaded
 
   std::thread thread;  // of the pipeline
 
-  explicit State(PipelineSettings given) : settings(std::move(given)) { request.model = settings.model; }
+  explicit State(PipelineSettings given) : settings(std::move(given)) {}
 
   // --- with the mutex locked
 
@@ -183,6 +170,7 @@ struct Pipeline::State {
       }
     }
     close_source();
+    now.model.reset();
     show_model(nullptr);
     std::lock_guard<std::mutex> lock(mutex);
     has_ended = true;
@@ -297,7 +285,7 @@ struct Pipeline::State {
     }
     source_number = now.source_number;
     waiting_since.reset();
-    if (model != nullptr) model->forget();
+    if (model != nullptr) (*model)->reset();
     std::lock_guard<std::mutex> lock(mutex);
     is_photo = source->info().frame_count == 1 && !source->info().is_live;
     counts.dropped_frames = 0;
@@ -323,29 +311,21 @@ struct Pipeline::State {
     note_change();
   }
 
-  void show_model(std::shared_ptr<LiveModel> next) {
+  void show_model(std::shared_ptr<LiveModelUse> next) {
     std::lock_guard<std::mutex> lock(mutex);
     model.swap(next);
   }
 
   bool load_model() {
-    if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
-    // Before the load, which takes a while.
-    while (report_a_change()) {
+    if (now.model != nullptr) {
+      if (!enter_if_current(MAQ_PIPELINE_LOADING)) return false;
+      // Before the load, which takes a while.
+      while (report_a_change()) {
+      }
     }
     show_model(nullptr);  // before the next one takes memory
-    std::shared_ptr<LiveModel> loaded = now.model.made;
-    if (loaded == nullptr) {
-      Bundle bundle = now.model.read_bundle();
-      const Manifest manifest = bundle.manifest;
-      loaded = make_live_model(settings.runtime(), std::move(bundle), now.model);
-      settings.source.log.write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
-                                ") loaded, ", loaded->threads(), " thread(s)");
-    }
-    show_model(loaded);
-    budget.reset();
-    const FrameEffort full = loaded->effort();
-    if (settings.frame_budget_ms > 0 && full.key_frame_interval > 0) budget.emplace(settings.frame_budget_ms, full);
+    if (now.model != nullptr) (*now.model)->load();
+    show_model(now.model);
     model_number = now.model_number;
     std::lock_guard<std::mutex> lock(mutex);
     return is_current();
@@ -369,15 +349,17 @@ struct Pipeline::State {
     }
     record_frame();
     const auto begin = Clock::now();
-    model->set_roll(roll_rad);
-    model->run(frame, source->intrinsics(), output);
+    if (model != nullptr) {
+      (*model)->run(frame, source->intrinsics(), output);
+    } else {
+      output.reset();
+    }
     deliver(ms_between(*std::exchange(waiting_since, std::nullopt), begin), begin);
   }
 
   void deliver(double wait_ms, Clock::time_point begin) {
     const auto end = Clock::now();
     const uint64_t dropped_frames = source->drops();
-    keep_budget(end, ms_between(begin, end));
     std::unique_lock<std::mutex> lock(mutex);
     if (is_ending || request.source_number != now.source_number) return;
     PipelineTimes times{++counts.results, wait_ms, ms_between(begin, end), -1};
@@ -387,7 +369,6 @@ struct Pipeline::State {
     counts.dropped_frames = dropped_frames;
     counts.results_per_second = rate.add(end);
     counts.latest = times;
-    counts.effort = model->effort();
     if (settings.on_result) {
       bool taken = false;
       call_back(lock, [&] { taken = settings.on_result(frame, output, times); });
@@ -401,16 +382,6 @@ struct Pipeline::State {
     }
     lock.unlock();
     frame.clear();  // of a result that was dropped
-  }
-
-  // After a frame.
-  void keep_budget(Clock::time_point end, double run_ms) {
-    if (!budget || !budget->add(end, run_ms)) return;
-    const FrameEffort& effort = budget->effort();
-    model->set_effort(effort);
-    settings.source.log.write(MAQ_LOG_INFO, "A frame took ", run_ms, " ms, of ", settings.frame_budget_ms,
-                              ": from now on one key frame in ", effort.key_frame_interval, ", long side ",
-                              effort.long_side_px, " px");
   }
 
   // A disk that is full ends the recording, not the results.
@@ -469,7 +440,7 @@ Pipeline::~Pipeline() {
   stop();
   std::unique_lock<std::mutex> lock(state.mutex);
   state.is_ending = true;
-  if (state.model != nullptr) state.model->cancel();
+  if (state.model != nullptr) (*state.model)->cancel();
   state.changed.notify_all();
   bool waits = state.thread.get_id() != std::this_thread::get_id();
   const auto patience_ends = Clock::now() + kOpeningPatience;
@@ -497,10 +468,11 @@ void Pipeline::set_source(const std::string& uri) {
   state_->enter(MAQ_PIPELINE_OPENING);
 }
 
-void Pipeline::set_model(const PipelineModel& model) {
+void Pipeline::set_model(const std::shared_ptr<LiveModel>& model) {
+  std::shared_ptr<LiveModelUse> use = model != nullptr ? model->use_for(this) : nullptr;
   std::lock_guard<std::mutex> lock(state_->mutex);
   State& state = *state_;
-  state.request.model = model;
+  state.request.model.swap(use);
   ++state.request.model_number;
   ++state.request_number;
   // A photo may be mapped already while its end is not told yet.
@@ -517,8 +489,6 @@ void Pipeline::set_paused(bool is_paused) {
   state_->is_paused = is_paused;
   state_->note_change();
 }
-
-void Pipeline::set_roll(float rad) { state_->roll_rad = rad; }
 
 void Pipeline::set_recording(const std::string& path) {
   std::lock_guard<std::mutex> lock(state_->mutex);
@@ -541,7 +511,8 @@ void Pipeline::stop() {
   state.changed.wait(lock, [&] { return !state.in_callback; });
 }
 
-maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, PipelineOutput& output, PipelineTimes& times) {
+maq_status Pipeline::acquire(int64_t timeout_ns, Frame& frame, std::unique_ptr<LiveOutput>& output,
+                             PipelineTimes& times) {
   const std::shared_ptr<State> state = state_;
   std::unique_lock<std::mutex> lock(state->mutex);
   const auto is_over = [&] {
@@ -581,21 +552,6 @@ std::string Pipeline::source_uri() const {
 PipelineStats Pipeline::stats() const {
   std::lock_guard<std::mutex> lock(state_->mutex);
   return state_->counts;
-}
-
-const SurfaceGrid& Pipeline::surface() {
-  std::shared_ptr<LiveModel> model;
-  {
-    std::lock_guard<std::mutex> lock(state_->mutex);
-    model = state_->model;
-  }
-  if (model == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "No model is loaded yet; wait for MAQ_PIPELINE_RUNNING.");
-  const SurfaceGrid& grid = model->surface();
-  std::lock_guard<std::mutex> lock(state_->mutex);
-  for (const SurfaceGrid& known : state_->surfaces) {
-    if (is_same(known, grid)) return known;
-  }
-  return state_->surfaces.emplace_back(grid);
 }
 
 }  // namespace maq

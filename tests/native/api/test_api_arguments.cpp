@@ -270,22 +270,25 @@ TEST_F(ApiArguments, ErrorsNameTheParameterOfTheHeader) {
 TEST_F(ApiArguments, FieldsOfAConfigInAConfigAreNamedWithBoth) {
   const auto expect_refused = [&](const char* text, auto change) {
     maq_densepose_config densepose;
+    ASSERT_EQ(maq_densepose_config_init(&densepose, sizeof densepose), MAQ_OK);
+    change(densepose);
+    maq_model* model = nullptr;
+    expect_error(maq_densepose_model_create(context_, &densepose, &model), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
+  };
+  expect_refused("config.model.threads is -2", [](auto& densepose) { densepose.model.threads = -2; });
+  expect_refused("config.model.bundle_files is NULL", [](auto& densepose) { densepose.model.bundle_file_count = 1; });
+  const auto expect_source_refused = [&](const char* text, auto change) {
     maq_source_config source;
     maq_pipeline_config config;
-    ASSERT_EQ(maq_densepose_config_init(&densepose, sizeof densepose), MAQ_OK);
     ASSERT_EQ(maq_source_config_init(&source, sizeof source), MAQ_OK);
     ASSERT_EQ(maq_pipeline_config_init(&config, sizeof config), MAQ_OK);
-    config.densepose = &densepose;
     config.source = &source;
-    change(densepose, source);
+    change(source);
     maq_pipeline* pipeline = nullptr;
     expect_error(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
   };
-  expect_refused("config.densepose.model.threads is -2", [](auto& densepose, auto&) { densepose.model.threads = -2; });
-  expect_refused("config.densepose.model.bundle_files is NULL",
-                 [](auto& densepose, auto&) { densepose.model.bundle_file_count = 1; });
-  expect_refused("config.source.queue_length is 0", [](auto&, auto& source) { source.queue_length = 0; });
-  expect_refused("config.source.struct_size is 1", [](auto&, auto& source) { source.struct_size = 1; });
+  expect_source_refused("config.source.queue_length is 0", [](auto& source) { source.queue_length = 0; });
+  expect_source_refused("config.source.struct_size is 1", [](auto& source) { source.struct_size = 1; });
 }
 
 TEST_F(ApiArguments, WhyNothingWasMadeIsFoundWithAndWithoutTheContext) {

@@ -34,9 +34,8 @@ TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWait
   maquette::Source live(context, "stub:people?live=1");
   std::optional<maquette::Frame> frame = live.next();
   maquette::DensePoseResult result = densepose.run(*frame);
-  maq_pipeline_config pipeline_config = maquette::default_pipeline_config();
-  pipeline_config.densepose = &config;
-  maquette::Pipeline pipeline(context, pipeline_config);
+  maquette::Pipeline pipeline(context);
+  pipeline.set_model(maquette::DensePoseModel(context, config));
   const maquette::Scene scene = api_tiny_scene::ball_scene(context);
   maq_scene_renderer_config render_config = api_tiny_scene::renderer_config();
   render_config.threads = 2;

@@ -249,16 +249,18 @@ TEST(MemoryLimits, APipelineIsOutOfMemoryAndEnds) {
   find_onnxruntime();
   const maq_densepose_config densepose = one_thread();
   maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &densepose;
   FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
     maq_pipeline* pipeline = nullptr;
+    maq_model* model = nullptr;
     failing.begin();
     maq_status status = maq_pipeline_create(context.get(), &config, &pipeline);
+    if (status == MAQ_OK) status = maq_densepose_model_create(context.get(), &densepose, &model);
+    if (status == MAQ_OK) status = maq_pipeline_set_model(pipeline, model);
     if (status == MAQ_OK) status = maq_pipeline_set_source(pipeline, "stub:people?size=160x120");
-    maq_pipeline_result result{};
-    result.struct_size = sizeof result;
+    maq_pipeline_result* result = nullptr;
     if (status == MAQ_OK) status = maq_pipeline_acquire_result(pipeline, MAQ_WAIT_FOREVER, &result);
-    maq_pipeline_release_result(&result);
+    maq_pipeline_result_release(result);
+    maq_model_destroy(model);
     maq_pipeline_destroy(pipeline);
     return status;
   });

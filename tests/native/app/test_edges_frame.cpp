@@ -11,10 +11,8 @@ class EdgesFrame : public ::testing::Test {
     maq_edges_config edges = maquette::default_edges_config();
     edges.bundle_path = MAQ_TEST_MODELS "/edges-int8";
     const maq_edges_curves_config curves = maquette::default_edges_curves_config();
-    maq_pipeline_config config = maquette::default_pipeline_config();
-    config.edges = &edges;
-    config.curves = finds_curves ? &curves : nullptr;
-    maquette::Pipeline pipeline(context_, config);
+    maquette::Pipeline pipeline(context_);
+    pipeline.set_model(maquette::EdgesModel(context_, edges, finds_curves ? &curves : nullptr));
     pipeline.set_source(uri);
     return std::move(*pipeline.next());
   }

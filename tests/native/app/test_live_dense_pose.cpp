@@ -70,7 +70,7 @@ class Live {
     sequences_.push_back(result.frame.desc().sequence);
     widths_.push_back(result.frame.desc().width_px);
     EXPECT_EQ(result.number, numbers_.size());
-    EXPECT_EQ(result.densepose.width_px(), result.frame.desc().width_px);
+    EXPECT_EQ(maquette::densepose_of(result).width_px(), result.frame.desc().width_px);
   }
 
   mutable std::mutex mutex_;

@@ -17,13 +17,13 @@ struct SeenEdges {
 // What came from the pipeline.
 class EdgesRun {
  public:
-  explicit EdgesRun(const maquette::EdgesModel& model = shipped(), uint64_t max_results = 0)
+  explicit EdgesRun(const maquette::LiveEdgesOptions& model = shipped(), uint64_t max_results = 0)
       : live(
             context, model, [this](const maquette::PipelineResult& result, double) { keep(result); }, nullptr,
             options(max_results)) {}
 
-  static maquette::EdgesModel shipped() {
-    maquette::EdgesModel model;
+  static maquette::LiveEdgesOptions shipped() {
+    maquette::LiveEdgesOptions model;
     model.edges.bundle_path = MAQ_TEST_MODELS "/edges-int8";
     return model;
   }
@@ -48,9 +48,10 @@ class EdgesRun {
   void keep(const maquette::PipelineResult& result) {
     std::lock_guard<std::mutex> lock(mutex_);
     SeenEdges seen;
-    seen.network_pixels = result.edges->stats().network_pixel_count;
-    seen.has_curves = result.curves.has_value();
-    if (seen.has_curves) seen.curves = result.curves->curves().size(), seen.boxes = result.curves->boxes().size();
+    seen.network_pixels = maquette::edges_of(result)->stats().network_pixel_count;
+    const auto curves = maquette::curves_of(result);
+    seen.has_curves = curves.has_value();
+    if (seen.has_curves) seen.curves = curves->curves().size(), seen.boxes = curves->boxes().size();
     seen_.push_back(seen);
   }
 
@@ -79,7 +80,7 @@ TEST(LiveEdges, ADepthImageIsLookedAtAgainWithWhatIsSwitchedOnAndOff) {
   ASSERT_EQ(edges.seen().size(), 1u);
   EXPECT_GT(edges.seen()[0].curves, 3u);
   EXPECT_EQ(edges.seen()[0].boxes, 1u);
-  maquette::EdgesModel model = EdgesRun::shipped();
+  maquette::LiveEdgesOptions model = EdgesRun::shipped();
   model.finds_boxes = false;
   edges.live.set_model(model);
   ASSERT_TRUE(wait_until([&] { return edges.seen().size() == 2; }));
@@ -92,7 +93,7 @@ TEST(LiveEdges, ADepthImageIsLookedAtAgainWithWhatIsSwitchedOnAndOff) {
 }
 
 TEST(LiveEdges, StartsWithWhatItWasTold) {
-  maquette::EdgesModel model = EdgesRun::shipped();
+  maquette::LiveEdgesOptions model = EdgesRun::shipped();
   model.finds_curves = false;
   model.edges.skip_planes = 1;
   EdgesRun edges(model);

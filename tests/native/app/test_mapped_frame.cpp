@@ -14,9 +14,8 @@ class MappedFrame : public ::testing::Test {
   maquette::PipelineResult mapped() {
     maq_densepose_config densepose = maquette::default_densepose_config();
     densepose.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-    maq_pipeline_config config = maquette::default_pipeline_config();
-    config.densepose = &densepose;
-    maquette::Pipeline pipeline(context_, config);
+    maquette::Pipeline pipeline(context_);
+    pipeline.set_model(maquette::DensePoseModel(context_, densepose));
     pipeline.set_source("image:" MAQ_TEST_MEDIA "/photo.jpg");
     return std::move(*pipeline.next());
   }
@@ -27,6 +26,7 @@ class MappedFrame : public ::testing::Test {
 
 TEST_F(MappedFrame, HasTheFrameAndItsPlanesPixelByPixel) {
   maquette::PipelineResult from = mapped();
+  const maquette::DensePoseResult densepose = maquette::densepose_of(from);
   maquette::RgbaImage camera;
   camera.copy_from(from.frame);
   const size_t pixels = camera.rgba.size() / 4;
@@ -35,13 +35,13 @@ TEST_F(MappedFrame, HasTheFrameAndItsPlanesPixelByPixel) {
                                         MAQ_DENSEPOSE_PLANE_PERSON};
   for (size_t channel = 0; channel < 4; ++channel) {
     size_t stride_bytes = 0;
-    const uint8_t* const rows = from.densepose.plane(planes[channel], &stride_bytes);
+    const uint8_t* const rows = densepose.plane(planes[channel], &stride_bytes);
     for (size_t i = 0; i < pixels; ++i) {
       const size_t x = i % size_t(camera.width_px), y = i / size_t(camera.width_px);
       wanted[4 * i + channel] = rows[y * stride_bytes + x];
     }
   }
-  const uint32_t people = from.densepose.person_count();
+  const uint32_t people = densepose.person_count();
   ASSERT_GT(people, 0u);
   const uint64_t number = from.number;
 

@@ -27,14 +27,16 @@ maq_edges_config edges_config(const char* bundle = kTinyEdges) {
 class EdgesPipeline : public testing::Test {
  protected:
   maquette::Pipeline pipeline(bool with_curves, maq_pipeline_result_callback callback = nullptr, void* self = nullptr) {
-    const maq_edges_config edges = edges_config();
-    const maq_edges_curves_config curves = maquette::default_edges_curves_config();
     maq_pipeline_config config = maquette::default_pipeline_config();
-    config.edges = &edges;
-    config.curves = with_curves ? &curves : nullptr;
     config.result_callback = callback;
     config.result_user_data = self;
-    return maquette::Pipeline(context, config);
+    maquette::Pipeline made(context, config);
+    made.set_model(model(edges_config(), with_curves));
+    return made;
+  }
+  maquette::EdgesModel model(const maq_edges_config& edges, bool with_curves = false) {
+    const maq_edges_curves_config curves = maquette::default_edges_curves_config();
+    return maquette::EdgesModel(context, edges, with_curves ? &curves : nullptr);
   }
   // What it says when it cannot go on.
   static std::string failure(maquette::Pipeline& pipeline, maq_status status) {
@@ -61,21 +63,21 @@ TEST_F(EdgesPipeline, GivesWhatARunOfTheFrameGives) {
   int count = 0;
   while (const auto result = live.next(kLongEnoughNs)) {
     ++count;
-    ASSERT_TRUE(result->edges);
-    ASSERT_TRUE(result->curves);
-    EXPECT_EQ(result->densepose.get(), nullptr);
+    const auto found_edges = maquette::edges_of(*result);
+    const auto found_curves = maquette::curves_of(*result);
+    ASSERT_TRUE(found_edges);
+    ASSERT_TRUE(found_curves);
+    EXPECT_EQ(maquette::densepose_of(*result).get(), nullptr);
     const maquette::EdgesResult expected = edges.run(result->frame, *source.intrinsics());
-    ASSERT_EQ(result->edges->width_px(), 96);
-    EXPECT_EQ(std::memcmp(result->edges->distance_r(), expected.distance_r(), 96 * 72 * sizeof(float)), 0);
-    const std::vector<maq_edges_curve> found = result->curves->curves(), wanted = expected.find_curves().curves();
+    ASSERT_EQ(found_edges->width_px(), 96);
+    EXPECT_EQ(std::memcmp(found_edges->distance_r(), expected.distance_r(), 96 * 72 * sizeof(float)), 0);
+    const std::vector<maq_edges_curve> found = found_curves->curves(), wanted = expected.find_curves().curves();
     ASSERT_EQ(found.size(), wanted.size());
     for (size_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i].length_m, wanted[i].length_m);
-    EXPECT_EQ(result->edges->find_curves().curves().size(), wanted.size()) << "the result is as any other";
-    EXPECT_GE(result->run_ms, double(result->edges->stats().total_ms));
+    EXPECT_EQ(found_edges->find_curves().curves().size(), wanted.size()) << "the result is as any other";
+    EXPECT_GE(result->run_ms, double(found_edges->stats().total_ms));
   }
   EXPECT_GT(count, 0);
-  EXPECT_EQ(live.stats().key_frame_interval, 0);
-  EXPECT_FALSE(live.surface());
 }
 
 TEST_F(EdgesPipeline, CurvesAreFoundOnlyWhereTheyAreAskedFor) {
@@ -83,8 +85,8 @@ TEST_F(EdgesPipeline, CurvesAreFoundOnlyWhereTheyAreAskedFor) {
   live.set_source(kStub);
   const auto result = live.next(kLongEnoughNs);
   ASSERT_TRUE(result);
-  EXPECT_TRUE(result->edges);
-  EXPECT_FALSE(result->curves);
+  EXPECT_TRUE(maquette::edges_of(*result));
+  EXPECT_FALSE(maquette::curves_of(*result));
 }
 
 TEST_F(EdgesPipeline, ACallbackGetsEachFrameAndMayKeepSome) {
@@ -95,8 +97,8 @@ TEST_F(EdgesPipeline, ACallbackGetsEachFrameAndMayKeepSome) {
   {
     maquette::Pipeline live = pipeline(
         true,
-        [](void* self, const maq_pipeline_result* result) {
-          maquette::PipelineResult taken(*result);
+        [](void* self, maq_pipeline_result* result) {
+          maquette::PipelineResult taken(result);
           auto* const all = static_cast<Kept*>(self);
           if (++all->count % 8 == 0) all->results.push_back(std::move(taken));
         },
@@ -107,8 +109,9 @@ TEST_F(EdgesPipeline, ACallbackGetsEachFrameAndMayKeepSome) {
   EXPECT_EQ(kept.count, 20);
   ASSERT_EQ(kept.results.size(), 2u) << "they outlive the pipeline";
   for (const maquette::PipelineResult& one : kept.results) {
-    EXPECT_GT(one.edges->depth_m()[0], 0);
-    for (const maq_edges_curve& curve : one.curves->curves()) EXPECT_GT(curve.length_m, 0);
+    EXPECT_GT(maquette::edges_of(one)->depth_m()[0], 0);
+    const auto curves = maquette::curves_of(one);
+    for (const maq_edges_curve& curve : curves->curves()) EXPECT_GT(curve.length_m, 0);
   }
 }
 
@@ -121,27 +124,26 @@ TEST_F(EdgesPipeline, ASourceWithoutDepthOrCalibrationFailsWithItsSentence) {
   live.set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?fov=60");
   EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("without depth"), std::string::npos);
   live.set_source(kStub);
-  EXPECT_TRUE(live.next(kLongEnoughNs)->edges) << "another source goes on";
+  EXPECT_TRUE(maquette::edges_of(*live.next(kLongEnoughNs))) << "another source goes on";
 }
 
 TEST_F(EdgesPipeline, ModelsTakeTurns) {
   maquette::Pipeline live = pipeline(true);
   live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=200");
-  EXPECT_TRUE(live.next(kLongEnoughNs)->curves);
+  EXPECT_TRUE(maquette::curves_of(*live.next(kLongEnoughNs)));
   maq_densepose_config people = maquette::default_densepose_config();
   people.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   people.model.threads = 1;
   live.stop();
-  live.set_densepose(people);
+  live.set_model(maquette::DensePoseModel(context, people));
   live.set_source("stub:pattern?size=96x72&live=1&fps=200");
-  EXPECT_NE(live.next(kLongEnoughNs)->densepose.get(), nullptr);
-  EXPECT_EQ(live.stats().key_frame_interval, 1);
+  EXPECT_NE(maquette::densepose_of(*live.next(kLongEnoughNs)).get(), nullptr);
   live.stop();
-  live.set_edges(edges_config());
+  live.set_model(model(edges_config()));
   live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=200");
   const auto result = live.next(kLongEnoughNs);
-  EXPECT_TRUE(result->edges);
-  EXPECT_FALSE(result->curves);
+  EXPECT_TRUE(maquette::edges_of(*result));
+  EXPECT_FALSE(maquette::curves_of(*result));
 }
 
 TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
@@ -161,13 +163,12 @@ TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
   const maquette::Context logged(of_context);
   maq_edges_config edges = edges_config();
   edges.threads = MAQ_THREADS_MEASURED;
-  maq_pipeline_config config = maquette::default_pipeline_config();
-  config.edges = &edges;
-  maquette::Pipeline live(logged, config);
+  maquette::Pipeline live(logged);
+  live.set_model(maquette::EdgesModel(logged, edges));
   live.set_source(kStub);
   const auto result = live.next(kLongEnoughNs);
-  ASSERT_TRUE(result && result->edges);
-  const maq_edges_stats stats = result->edges->stats();
+  ASSERT_TRUE(result && maquette::edges_of(*result));
+  const maq_edges_stats stats = maquette::edges_of(*result)->stats();
   EXPECT_GE(stats.threads, 1);
   EXPECT_LE(stats.threads, 4);
   EXPECT_EQ(stats.is_threads_measured, 1);
@@ -179,42 +180,28 @@ TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
 TEST_F(EdgesPipeline, WrongArgumentsAreRefused) {
   const maq_edges_config edges = edges_config();
   maq_edges_curves_config curves = maquette::default_edges_curves_config();
-  const maq_densepose_config densepose = maquette::default_densepose_config();
-  const auto refused = [&](const maq_pipeline_config& config, const char* text) {
-    maq_pipeline* made = nullptr;
-    EXPECT_EQ(maq_pipeline_create(context.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  const auto refused = [&](const maq_edges_config* config, const maq_edges_curves_config* wanted, const char* text) {
+    maq_model* made = nullptr;
+    EXPECT_EQ(maq_edges_model_create(context.get(), config, wanted, &made), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(made, nullptr);
     EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
   };
-  maq_pipeline_config config = maquette::default_pipeline_config();
-  config.edges = &edges;
-  config.densepose = &densepose;
-  refused(config, "config.densepose and config.edges");
-  config.edges = nullptr;
-  config.curves = &curves;
-  refused(config, "config.curves is given without config.edges");
-  config.densepose = nullptr;
-  config.edges = &edges;
   curves.gap_r = -1;
-  refused(config, "gap_r is -1");
+  refused(&edges, &curves, "gap_r is -1");
   maq_edges_config wrong = edges;
   wrong.threads = 99;
-  config.edges = &wrong;
-  config.curves = nullptr;
-  refused(config, "config.edges.threads is 99");
-  maquette::Pipeline live = pipeline(false);
-  EXPECT_EQ(maq_pipeline_set_edges(nullptr, &edges, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_pipeline_set_edges(live.get(), &wrong, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_pipeline_set_edges(live.get(), &edges, &curves), MAQ_ERROR_INVALID_ARGUMENT);
+  refused(&wrong, nullptr, "threads is 99");
+  EXPECT_EQ(maq_edges_model_create(nullptr, &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_edges_model_create(context.get(), &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(EdgesPipeline, ABundleOfAnotherTaskFailsAndTheRightOneGoesOn) {
   maquette::Pipeline live = pipeline(true);
-  live.set_edges(edges_config(MAQ_TEST_DATA "/tiny_bundle"));
+  live.set_model(model(edges_config(MAQ_TEST_DATA "/tiny_bundle")));
   live.set_source(kStub);
   EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("densepose"), std::string::npos);
-  live.set_edges(edges_config());
-  EXPECT_TRUE(live.next(kLongEnoughNs)->edges);
+  live.set_model(model(edges_config()));
+  EXPECT_TRUE(maquette::edges_of(*live.next(kLongEnoughNs)));
 }
 
 TEST_F(EdgesPipeline, BearsCallsFromManyThreads) {
@@ -227,15 +214,15 @@ TEST_F(EdgesPipeline, BearsCallsFromManyThreads) {
       while (!is_over) {
         try {
           const auto result = live.next(20000000);
-          if (result && result->curves) result->curves->snap_to_pixel(40, 30, 20);
+          const auto curves = result ? maquette::curves_of(*result) : std::nullopt;
+          if (curves) curves->snap_to_pixel(40, 30, 20);
         } catch (const maquette::Error&) {  // in time, or while the model is loaded
         }
       }
     });
   }
-  const maq_edges_curves_config curves = maquette::default_edges_curves_config();
   for (int i = 0; i < 6; ++i) {
-    live.set_edges(edges_config(), i % 2 == 0 ? &curves : nullptr);
+    live.set_model(model(edges_config(), i % 2 == 0));
     live.stats();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

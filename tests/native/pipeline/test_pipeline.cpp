@@ -44,24 +44,28 @@ class Watched {
     source.loop = options.loop ? 1 : 0;
     source.reconnect_ms = options.reconnect_ms;
     source.stall_ms = options.stall_ms;
-    const maq_densepose_config densepose = densepose_config(options.bundle);
     maq_pipeline_config config = maquette::default_pipeline_config();
-    config.densepose = &densepose;
     config.source = &source;
     config.result_pool_size = options.pool_size;
-    config.frame_budget_ms = options.frame_budget_ms;
     config.result_user_data = config.state_user_data = this;
     if (!options.polls) {
-      config.result_callback = [](void* self, const maq_pipeline_result* result) {
-        static_cast<Watched*>(self)->take(maquette::PipelineResult(*result));
+      config.result_callback = [](void* self, maq_pipeline_result* result) {
+        static_cast<Watched*>(self)->take(maquette::PipelineResult(result));
       };
     }
     config.state_callback = [](void* self, maq_pipeline_state state, maq_status, const char*) {
       static_cast<Watched*>(self)->take_state(state);
     };
     pipeline.emplace(context, config);
+    set_model(densepose_config(options.bundle));
   }
   ~Watched() { pipeline.reset(); }
+
+  void set_model(const maq_densepose_config& config) {
+    model.emplace(context, config);
+    model->set_frame_budget(options.frame_budget_ms);
+    pipeline->set_model(*model);
+  }
 
   // Looks again after each result and change of state, and every few milliseconds.
   template <class Condition>
@@ -104,6 +108,7 @@ class Watched {
   Options options;
   maquette::Context context;
   std::optional<maquette::Pipeline> pipeline;
+  std::optional<maquette::DensePoseModel> model;
 
  private:
   void take(const maquette::PipelineResult& result) {
@@ -111,7 +116,7 @@ class Watched {
       std::lock_guard<std::mutex> lock(mutex_);
       sequences_.push_back(result.frame.desc().sequence);
       widths_.push_back(result.frame.desc().width_px);
-      EXPECT_EQ(result.densepose.width_px(), widths_.back());
+      EXPECT_EQ(maquette::densepose_of(result).width_px(), widths_.back());
       EXPECT_GT(result.number, last_number_);
       last_number_ = result.number;
     }
@@ -151,11 +156,10 @@ void load_model(Watched& watched) {
 }
 
 maq_status status_of_next(maquette::Pipeline& pipeline, int64_t timeout_ns = MAQ_WAIT_FOREVER) {
-  maq_pipeline_result result{};
-  result.struct_size = sizeof result;
+  maq_pipeline_result* result = nullptr;
   const maq_status status = maq_pipeline_acquire_result(pipeline.get(), timeout_ns, &result);
-  EXPECT_EQ(result.frame != nullptr, status == MAQ_OK);
-  maq_pipeline_release_result(&result);
+  EXPECT_EQ(maq_pipeline_result_get_frame(result) != nullptr, status == MAQ_OK);
+  maq_pipeline_result_release(result);
   return status;
 }
 
@@ -181,7 +185,7 @@ TEST(Pipeline, ACallerThatPollsGetsTheLastResultAndThenTheEnd) {
   ASSERT_TRUE(last.has_value());
   EXPECT_EQ(last->number, 7u);
   EXPECT_EQ(last->frame.desc().sequence, 6u);
-  EXPECT_EQ(last->densepose.width_px(), 64);
+  EXPECT_EQ(maquette::densepose_of(*last).width_px(), 64);
   EXPECT_GE(last->wait_ms, 0);
   EXPECT_GT(last->run_ms, 0);
   EXPECT_EQ(last->age_ms, -1) << "of a file nothing is known";
@@ -230,13 +234,13 @@ TEST(Pipeline, PausesAndGoesOn) {
   EXPECT_EQ(watched.sequences(), (std::vector<uint64_t>{0, 1, 2, 3, 4, 5, 6, 7}));
 }
 
-TEST(Pipeline, ARollHoldsForTheNextFramesAndForAnotherModel) {
+TEST(Pipeline, ARollHoldsForTheNextFrames) {
   Watched* self = nullptr;
   std::vector<int> widths;
   Watched::Options options;
   options.on_result = [&](const maquette::PipelineResult& result) {
-    widths.push_back(result.densepose.stats().network_width_px);
-    if (result.number == 2) self->pipeline->set_roll(1.57f);
+    widths.push_back(maquette::densepose_of(result).stats().network_width_px);
+    if (result.number == 2) self->model->set_roll(1.57f);
   };
   Watched watched(options);
   self = &watched;
@@ -333,7 +337,7 @@ TEST(Pipeline, ABadModelFailsAndAGoodOneGoesOn) {
   watched.pipeline->set_source("stub:pattern?frames=2&size=32x32");
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_FAILED)) << "another source does not hide it";
   const maq_densepose_config config = densepose_config();
-  watched.pipeline->set_densepose(config);
+  watched.set_model(config);
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
   EXPECT_EQ(watched.count(), 2u);
 }
@@ -345,7 +349,8 @@ TEST(Pipeline, LoadingIsReportedBeforeItIsOver) {
   options.on_state = [&](maq_pipeline_state state) {
     maq_densepose_surface surface{};
     surface.struct_size = sizeof surface;
-    if (state == MAQ_PIPELINE_LOADING) surface_status = maq_pipeline_get_surface(watched->pipeline->get(), &surface);
+    if (state != MAQ_PIPELINE_LOADING) return;
+    surface_status = maq_densepose_model_get_surface(watched->model->get(), &surface);
   };
   Watched with_callback(options);
   watched = &with_callback;
@@ -357,12 +362,15 @@ TEST(Pipeline, LoadingIsReportedBeforeItIsOver) {
 TEST(Pipeline, WithoutAConfigTheModelIsTheInstalledOne) {
   Watched watched(polling(false));
   watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");
-  const int before_px = watched.pipeline->next()->densepose.stats().network_width_px;
-  ASSERT_EQ(maq_pipeline_set_densepose(watched.pipeline->get(), nullptr), MAQ_OK);
+  const int before_px = maquette::densepose_of(*watched.pipeline->next()).stats().network_width_px;
+  maq_model* model = nullptr;
+  ASSERT_EQ(maq_densepose_model_create(watched.context.get(), nullptr, &model), MAQ_OK);
+  ASSERT_EQ(maq_pipeline_set_model(watched.pipeline->get(), model), MAQ_OK);
+  maq_model_destroy(model);
   watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");
   const std::optional<maquette::PipelineResult> result = watched.pipeline->next();
   ASSERT_TRUE(result.has_value()) << watched.pipeline->info().problem;
-  const int after_px = result->densepose.stats().network_width_px;
+  const int after_px = maquette::densepose_of(*result).stats().network_width_px;
   EXPECT_EQ(after_px, maquette::DensePose(watched.context).run(result->frame).stats().network_width_px);
   EXPECT_NE(after_px, before_px);
 }
@@ -379,12 +387,13 @@ TEST(Pipeline, NoResultOfTheFormerSourceComesAfterAChange) {
 TEST(Pipeline, OptionsOfTheModelChangeWhileItRuns) {
   Watched watched(polling(true));
   watched.pipeline->set_source("stub:pattern?fps=50&size=64x48");
-  const int before = watched.pipeline->next()->densepose.stats().network_width_px;
+  const int before = maquette::densepose_of(*watched.pipeline->next()).stats().network_width_px;
   maq_densepose_config config = densepose_config();
   config.long_side_px = before / 2;
-  watched.pipeline->set_densepose(config);
-  EXPECT_TRUE(watched.until(
-      [&] { return watched.pipeline->next()->densepose.stats().network_width_px == config.long_side_px; }));
+  watched.set_model(config);
+  EXPECT_TRUE(watched.until([&] {
+    return maquette::densepose_of(*watched.pipeline->next()).stats().network_width_px == config.long_side_px;
+  }));
   EXPECT_EQ(watched.pipeline->info().state, MAQ_PIPELINE_RUNNING);
 }
 
@@ -392,11 +401,11 @@ TEST(Pipeline, AFrameBudgetThatCannotBeKeptMakesTheModelDoLessAndTheStatsSaySo) 
   Watched::Options options;
   options.frame_budget_ms = 1e-3;
   Watched watched(std::move(options));
-  EXPECT_EQ(watched.pipeline->stats().long_side_px, 0) << "no result yet";
+  EXPECT_EQ(watched.model->stats().long_side_px, 0) << "not loaded yet";
   watched.pipeline->set_source("stub:people?size=64x48&frames=40");
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
-  const maq_pipeline_stats stats = watched.pipeline->stats();
-  EXPECT_EQ(stats.result_count, 40u);
+  EXPECT_EQ(watched.pipeline->stats().result_count, 40u);
+  const maq_densepose_model_stats stats = watched.model->stats();
   EXPECT_EQ(stats.key_frame_interval, 4);
   EXPECT_EQ(stats.long_side_px, 160) << "half of the tiny bundle's";
 }
@@ -405,17 +414,15 @@ TEST(Pipeline, WithoutAFrameBudgetTheStatsSayWhatTheConfigDoes) {
   Watched watched({});
   watched.pipeline->set_source("stub:people?size=64x48&frames=20");
   ASSERT_TRUE(watched.until_state(MAQ_PIPELINE_ENDED));
-  EXPECT_EQ(watched.pipeline->stats().key_frame_interval, 1);
-  EXPECT_EQ(watched.pipeline->stats().long_side_px, 320);
+  EXPECT_EQ(watched.model->stats().key_frame_interval, 1);
+  EXPECT_EQ(watched.model->stats().long_side_px, 320);
 }
 
 TEST(Pipeline, ANegativeFrameBudgetIsRefused) {
   maquette::Context context;
-  maq_pipeline_config config = maquette::default_pipeline_config();
-  config.frame_budget_ms = -1;
-  maq_pipeline* pipeline = nullptr;
-  EXPECT_EQ(maq_pipeline_create(context.get(), &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(std::string(maq_last_error(context.get())).find("config.frame_budget_ms is -1"), std::string::npos);
+  const maquette::DensePoseModel model(context);
+  EXPECT_EQ(maq_densepose_model_set_frame_budget(model.get(), -1), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(maq_last_error(model.get())).find("budget_ms is -1"), std::string::npos);
 }
 
 TEST(Pipeline, APhotoIsMappedAgainWithOtherOptions) {
@@ -425,7 +432,7 @@ TEST(Pipeline, APhotoIsMappedAgainWithOtherOptions) {
   watched.pipeline->set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?size=64x48");
   EXPECT_TRUE(watched.pipeline->next().has_value());
   EXPECT_FALSE(watched.pipeline->next().has_value());
-  watched.pipeline->set_densepose(densepose_config());
+  watched.set_model(densepose_config());
   EXPECT_TRUE(watched.pipeline->next().has_value());
   EXPECT_FALSE(watched.pipeline->next().has_value());
 }
@@ -437,10 +444,10 @@ TEST(Pipeline, APhotoIsMappedAgainAlsoBeforeItsEndIsTold) {
     ASSERT_TRUE(watched.pipeline->next().has_value()) << i;
     maq_densepose_config config = densepose_config();
     config.long_side_px = i % 2 == 0 ? 128 : 160;
-    watched.pipeline->set_densepose(config);
+    watched.set_model(config);
     const auto again = watched.pipeline->next();
     ASSERT_TRUE(again.has_value()) << i;
-    EXPECT_EQ(again->densepose.stats().network_width_px, config.long_side_px) << i;
+    EXPECT_EQ(maquette::densepose_of(*again).stats().network_width_px, config.long_side_px) << i;
   }
 }
 
@@ -556,7 +563,7 @@ TEST(Pipeline, ResultsThatAreHeldOutliveIt) {
   std::vector<uint8_t> pixels(64 * 48 * 3);
   for (const maquette::PipelineResult& result : held) {
     result.frame.copy_pixels(MAQ_PIXEL_BGR8, pixels.data(), 0, pixels.size());
-    EXPECT_EQ(result.densepose.height_px(), 48);
+    EXPECT_EQ(maquette::densepose_of(result).height_px(), 48);
   }
 }
 
@@ -565,15 +572,14 @@ TEST(Pipeline, ResultsAreDroppedWhileACallbackHoldsThemAll) {
   Watched::Options options;
   options.pool_size = 2;
   maquette::Context context;
-  const maq_densepose_config densepose = densepose_config();
   maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &densepose;
   config.result_pool_size = 2;
   config.result_user_data = &held;
-  config.result_callback = [](void* all, const maq_pipeline_result* result) {
-    static_cast<std::vector<maquette::PipelineResult>*>(all)->emplace_back(*result);
+  config.result_callback = [](void* all, maq_pipeline_result* result) {
+    static_cast<std::vector<maquette::PipelineResult>*>(all)->emplace_back(result);
   };
   maquette::Pipeline pipeline(context, config);
+  pipeline.set_model(maquette::DensePoseModel(context, densepose_config()));
   pipeline.set_source("stub:pattern?frames=6&size=32x32");
   const auto end = std::chrono::steady_clock::now() + kLongEnough;
   while (pipeline.info().state != MAQ_PIPELINE_ENDED && std::chrono::steady_clock::now() < end) {
@@ -623,34 +629,32 @@ TEST(Pipeline, ARecordingIsCompleteWhenItIsDestroyed) {
   EXPECT_EQ(warned, "") << "it has its index";
 }
 
-TEST(Pipeline, KnowsTheSurfaceOfItsModel) {
+TEST(Pipeline, AModelKnowsItsSurface) {
   Watched::Options options = polling(false);
   options.bundle = MAQ_TEST_MODELS "/densepose-b-int8";
   Watched watched(options);
-  EXPECT_FALSE(watched.pipeline->surface().has_value()) << "no model is loaded yet";
+  EXPECT_FALSE(watched.model->surface().has_value()) << "no model is loaded yet";
   watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");
   ASSERT_TRUE(watched.pipeline->next().has_value());
-  const std::optional<maq_densepose_surface> surface = watched.pipeline->surface();
+  const std::optional<maq_densepose_surface> surface = watched.model->surface();
   ASSERT_TRUE(surface.has_value());
   EXPECT_GE(surface->nodes, 2);
-  watched.pipeline->set_densepose(densepose_config(options.bundle));
+  watched.pipeline->remove_model();
   watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");
   ASSERT_TRUE(watched.pipeline->next().has_value());
-  EXPECT_EQ(watched.pipeline->surface()->points_m, surface->points_m) << "the same surface stays where it is";
+  EXPECT_EQ(watched.model->surface()->points_m, surface->points_m) << "it stays where it is as long as the model";
 }
 
 TEST(Pipeline, RefusesWrongArguments) {
   const maquette::Context context;
-  const maq_densepose_config densepose = densepose_config();
   maq_pipeline* pipeline = nullptr;
   const auto refused = [&](const maq_pipeline_config& config) {
     EXPECT_EQ(maq_pipeline_create(context.get(), &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT);
     return std::string(maq_last_error(context.get()));
   };
   maq_pipeline_config config = maquette::default_pipeline_config();
-  config.densepose = &densepose;
-  config.result_pool_size = 0;
-  EXPECT_NE(refused(config).find("config.result_pool_size is 0"), std::string::npos);
+  config.result_pool_size = 65;
+  EXPECT_NE(refused(config).find("config.result_pool_size is 65"), std::string::npos);
   config.result_pool_size = 4;
   config.nice = 20;
   EXPECT_NE(refused(config).find("config.nice is 20"), std::string::npos);
@@ -667,30 +671,79 @@ TEST(Pipeline, RefusesWrongArguments) {
   EXPECT_NE(refused(config).find("struct_size is 3"), std::string::npos);
   EXPECT_EQ(pipeline, nullptr);
 
-  maquette::Pipeline good(context, [&] {
-    maq_pipeline_config sound = maquette::default_pipeline_config();
-    sound.densepose = &densepose;
-    return sound;
-  }());
+  maquette::Pipeline good(context);
+  const maquette::DensePoseModel model(context, densepose_config());
   EXPECT_EQ(maq_pipeline_set_source(good.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_pipeline_set_paused(good.get(), 2), MAQ_ERROR_INVALID_ARGUMENT);
   for (const float roll : {7.1f, -8.0f, std::numeric_limits<float>::quiet_NaN()}) {
-    EXPECT_EQ(maq_pipeline_set_roll(good.get(), roll), MAQ_ERROR_INVALID_ARGUMENT) << roll;
+    EXPECT_EQ(maq_densepose_model_set_roll(model.get(), roll), MAQ_ERROR_INVALID_ARGUMENT) << roll;
   }
-  EXPECT_EQ(maq_pipeline_set_roll(nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_model_set_roll(nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_pipeline_set_recording(good.get(), ""), MAQ_ERROR_INVALID_ARGUMENT);
-  maq_pipeline_result result{};
-  EXPECT_EQ(maq_pipeline_acquire_result(good.get(), 0, &result), MAQ_ERROR_INVALID_ARGUMENT);
+  maq_pipeline_result* result = nullptr;
+  EXPECT_EQ(maq_pipeline_acquire_result(good.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   for (const maq_status status :
-       {maq_pipeline_set_source(nullptr, "stub:pattern"), maq_pipeline_set_densepose(nullptr, &densepose),
+       {maq_pipeline_set_source(nullptr, "stub:pattern"), maq_pipeline_set_model(nullptr, model.get()),
         maq_pipeline_set_paused(nullptr, 1), maq_pipeline_set_recording(nullptr, nullptr), maq_pipeline_stop(nullptr),
         maq_pipeline_acquire_result(nullptr, 0, &result), maq_pipeline_get_info(good.get(), nullptr),
-        maq_pipeline_get_stats(good.get(), nullptr), maq_pipeline_get_surface(good.get(), nullptr)}) {
+        maq_pipeline_get_stats(good.get(), nullptr), maq_densepose_model_get_surface(model.get(), nullptr),
+        maq_densepose_model_get_stats(model.get(), nullptr), maq_pipeline_result_get_stats(nullptr, nullptr)}) {
     EXPECT_EQ(status, MAQ_ERROR_INVALID_ARGUMENT);
   }
-  maq_pipeline_release_result(nullptr);
-  maq_pipeline_release_result(&result);
+  maq_pipeline_result_release(nullptr);
+  maq_model_destroy(nullptr);
+  EXPECT_EQ(maq_pipeline_result_get_frame(nullptr), nullptr);
+  EXPECT_EQ(maq_pipeline_result_get_densepose(nullptr), nullptr);
   maq_pipeline_destroy(nullptr);
+}
+
+TEST(Pipeline, WithoutAModelResultsHaveAFrameOnly) {
+  const maquette::Context context;
+  maquette::Pipeline pipeline(context);
+  pipeline.set_source("stub:pattern?frames=1&size=64x48");
+  const std::optional<maquette::PipelineResult> result = pipeline.next();
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->frame.desc().width_px, 64);
+  EXPECT_EQ(maquette::densepose_of(*result).get(), nullptr);
+  EXPECT_FALSE(maquette::edges_of(*result).has_value());
+  EXPECT_FALSE(pipeline.next().has_value());
+}
+
+TEST(Pipeline, OnePipelineAtATimeRunsAModel) {
+  const maquette::Context context;
+  const maquette::DensePoseModel model(context, densepose_config());
+  maquette::Pipeline second(context);
+  {
+    maquette::Pipeline first(context);
+    first.set_model(model);
+    first.set_model(model);
+    EXPECT_EQ(maq_pipeline_set_model(second.get(), model.get()), MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(maq_last_error(second.get())).find("in use by another pipeline"), std::string::npos);
+  }
+  second.set_model(model);
+  second.set_source("stub:pattern?frames=1&size=64x48");
+  EXPECT_EQ(maquette::densepose_of(*second.next()).width_px(), 64);
+}
+
+TEST(Pipeline, PartsOfAResultAreGivenBackWithIt) {
+  Watched watched(polling(false));
+  watched.pipeline->set_source("stub:pattern?frames=1&size=64x48");
+  maq_pipeline_result* result = nullptr;
+  ASSERT_EQ(maq_pipeline_acquire_result(watched.pipeline->get(), MAQ_WAIT_FOREVER, &result), MAQ_OK);
+  const maq_frame* const frame = maq_pipeline_result_get_frame(result);
+  const maq_densepose_result* const people = maq_pipeline_result_get_densepose(result);
+  maq_frame_release(const_cast<maq_frame*>(frame));
+  EXPECT_NE(std::string(maq_last_error(nullptr)).find("belongs to a result of a pipeline"), std::string::npos);
+  maq_frame_desc desc{};
+  desc.struct_size = sizeof desc;
+  EXPECT_EQ(maq_frame_get_desc(frame, &desc), MAQ_OK);
+  int32_t width_px = 0;
+  EXPECT_EQ(maq_densepose_result_get_size(people, &width_px, nullptr), MAQ_OK);
+  EXPECT_EQ(width_px, 64);
+  EXPECT_EQ(maq_pipeline_result_get_edges(result), nullptr);
+  maq_pipeline_result_release(result);
+  EXPECT_EQ(maq_frame_get_desc(frame, &desc), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_result_get_size(people, &width_px, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST(Pipeline, BearsCallsFromManyThreads) {
@@ -705,7 +758,9 @@ TEST(Pipeline, BearsCallsFromManyThreads) {
           case 1: watched.pipeline->set_paused(i % 2 == 0); break;
           case 2: watched.pipeline->info(); break;
           case 3: status_of_next(*watched.pipeline, 20000000); break;
-          default: t == 0 ? watched.pipeline->stop() : watched.pipeline->set_densepose(densepose_config());
+          default:
+            t == 0 ? watched.pipeline->stop()
+                   : watched.pipeline->set_model(maquette::DensePoseModel(watched.context, densepose_config()));
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(t));
       }

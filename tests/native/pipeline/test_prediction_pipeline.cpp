@@ -33,10 +33,10 @@ class PredictionPipeline : public testing::Test {
       maq_pipeline_config made = maquette::default_pipeline_config();
       made.result_pool_size = 32;
       made.result_user_data = this;
-      made.result_callback = [](void* self, const maq_pipeline_result* result) {
+      made.result_callback = [](void* self, maq_pipeline_result* result) {
         auto* const kept = static_cast<Kept*>(self);
         const std::lock_guard<std::mutex> lock(kept->mutex);
-        kept->results.emplace_back(*result);
+        kept->results.emplace_back(result);
       };
       return made;
     }
@@ -71,7 +71,7 @@ class PredictionPipeline : public testing::Test {
     {
       const maquette::Predictor lent = predictor(method);
       const maquette::Surprise bits = surprise();
-      kept.pipeline.set_prediction(lent, 0.15, &bits);
+      kept.pipeline.set_model(maquette::PredictionModel(context, lent, 0.15, &bits));
     }
     kept.pipeline.set_source(kWalkers);
     ASSERT_TRUE(kept.until_ended());
@@ -80,22 +80,26 @@ class PredictionPipeline : public testing::Test {
     maquette::Surprise own_surprise = surprise();
     for (const maquette::PipelineResult& result : kept.results) {
       own.push(result.frame);
-      ASSERT_TRUE(result.predicted);
-      EXPECT_EQ(pixels_of(*result.predicted), pixels_of(own.predict(0.15)));
-      EXPECT_TRUE(result.predicted->is_predicted());
-      EXPECT_EQ(result.predicted->origin().horizon_ns, 150000000);
+      const auto predicted = maquette::predicted_frame_of(result);
+      ASSERT_TRUE(predicted);
+      EXPECT_EQ(pixels_of(*predicted), pixels_of(own.predict(0.15)));
+      EXPECT_TRUE(predicted->is_predicted());
+      EXPECT_EQ(predicted->origin().horizon_ns, 150000000);
       EXPECT_FALSE(result.frame.is_predicted());
-      EXPECT_EQ(result.densepose.get(), nullptr);
-      EXPECT_FALSE(result.edges);
+      EXPECT_EQ(maquette::densepose_of(result).get(), nullptr);
+      EXPECT_FALSE(maquette::edges_of(result));
       const maq_surprise_score score = own_surprise.push(result.frame);
-      EXPECT_EQ(result.surprise_bits, score.bits);
-      EXPECT_EQ(result.surprise_ratio, score.ratio);
-      EXPECT_EQ(result.is_event, score.is_event != 0);
-      EXPECT_EQ(result.is_cut, score.is_cut != 0);
-      EXPECT_EQ(result.is_start, score.is_start != 0);
+      const auto novelty = maquette::novelty_of(result);
+      ASSERT_TRUE(novelty);
+      EXPECT_EQ(novelty->bits, score.bits);
+      EXPECT_EQ(novelty->ratio, score.ratio);
+      EXPECT_EQ(novelty->is_event, score.is_event);
+      EXPECT_EQ(novelty->is_cut, score.is_cut);
+      EXPECT_EQ(novelty->is_start, score.is_start);
       EXPECT_GT(result.run_ms, 0);
     }
-    EXPECT_NE(pixels_of(*kept.results.back().predicted), pixels_of(kept.results.back().frame)) << "they walk";
+    EXPECT_NE(pixels_of(*maquette::predicted_frame_of(kept.results.back())), pixels_of(kept.results.back().frame))
+        << "they walk";
   }
 
   const maquette::Context context;
@@ -107,7 +111,7 @@ TEST_F(PredictionPipeline, NetworksAreThoseOfThePredictorWhichIsGone) { expect_a
 
 TEST_F(PredictionPipeline, WithoutSurpriseThereIsNoneAndAnotherSourceBeginsAnew) {
   Kept kept(context);
-  kept.pipeline.set_prediction(predictor(MAQ_PREDICTION_MOTION), 0.1);
+  kept.pipeline.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_MOTION), 0.1));
   for (size_t count : {10u, 20u}) {
     kept.pipeline.set_source(kWalkers);
     ASSERT_TRUE(wait_until([&] {
@@ -116,43 +120,42 @@ TEST_F(PredictionPipeline, WithoutSurpriseThereIsNoneAndAnotherSourceBeginsAnew)
     }));
   }
   for (size_t i = 0; i < 10; ++i) {
-    EXPECT_EQ(kept.results[i].surprise_bits, -1);
-    EXPECT_FALSE(kept.results[i].is_event || kept.results[i].is_cut || kept.results[i].is_start);
-    EXPECT_EQ(pixels_of(*kept.results[i].predicted), pixels_of(*kept.results[10 + i].predicted)) << i;
+    EXPECT_FALSE(maquette::novelty_of(kept.results[i]));
+    EXPECT_EQ(pixels_of(*maquette::predicted_frame_of(kept.results[i])),
+              pixels_of(*maquette::predicted_frame_of(kept.results[10 + i])))
+        << i;
   }
 }
 
 TEST_F(PredictionPipeline, ModelsTakeTurns) {
-  maquette::Pipeline live(context, maquette::default_pipeline_config());
-  live.set_prediction(predictor(MAQ_PREDICTION_AUTO), 0.1);
+  maquette::Pipeline live(context);
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_AUTO), 0.1));
   live.set_source("stub:people?size=96x72&live=1&fps=200");
-  EXPECT_TRUE(live.next(kPatienceNs)->predicted);
-  EXPECT_EQ(live.stats().key_frame_interval, 0);
-  EXPECT_FALSE(live.surface());
+  EXPECT_TRUE(maquette::predicted_frame_of(*live.next(kPatienceNs)));
   maq_densepose_config people = maquette::default_densepose_config();
   people.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   people.model.threads = 1;
   live.stop();
-  live.set_densepose(people);
+  live.set_model(maquette::DensePoseModel(context, people));
   live.set_source("stub:people?size=96x72&live=1&fps=200");
   const auto of_people = live.next(kPatienceNs);
-  EXPECT_NE(of_people->densepose.get(), nullptr);
-  EXPECT_FALSE(of_people->predicted);
-  EXPECT_EQ(of_people->surprise_bits, -1);
+  EXPECT_NE(maquette::densepose_of(*of_people).get(), nullptr);
+  EXPECT_FALSE(maquette::predicted_frame_of(*of_people));
+  EXPECT_FALSE(maquette::novelty_of(*of_people));
   const maquette::Surprise bits = surprise();
   live.stop();
-  live.set_prediction(predictor(MAQ_PREDICTION_LAST), 0, &bits);
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_LAST), 0, &bits));
   live.set_source("stub:people?size=96x72&live=1&fps=200&drop=0.2");
   for (int i = 0; i < 5; ++i) {
     const auto result = live.next(kPatienceNs);
-    EXPECT_EQ(pixels_of(*result->predicted), pixels_of(result->frame));
-    EXPECT_GE(result->surprise_bits, 0);
+    EXPECT_EQ(pixels_of(*maquette::predicted_frame_of(*result)), pixels_of(result->frame));
+    EXPECT_GE(maquette::novelty_of(*result)->bits, 0);
   }
 }
 
 TEST_F(PredictionPipeline, WhatCannotBePredictedFailsInASentence) {
-  maquette::Pipeline live(context, maquette::default_pipeline_config());
-  live.set_prediction(predictor(MAQ_PREDICTION_AUTO), 0.1);
+  maquette::Pipeline live(context);
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_AUTO), 0.1));
   live.set_source("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
   try {
     while (live.next(kPatienceNs)) {
@@ -163,25 +166,25 @@ TEST_F(PredictionPipeline, WhatCannotBePredictedFailsInASentence) {
     EXPECT_NE(std::strstr(error.what(), "epth"), nullptr) << error.what();
   }
   live.set_source(kWalkers);
-  EXPECT_TRUE(live.next(kPatienceNs)->predicted) << "another source goes on";
+  EXPECT_TRUE(maquette::predicted_frame_of(*live.next(kPatienceNs))) << "another source goes on";
 }
 
 TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
-  maquette::Pipeline live(context, maquette::default_pipeline_config());
   const maquette::Predictor right = predictor(MAQ_PREDICTION_AUTO);
   const maquette::Surprise bits = surprise();
-  const auto refused = [&](maq_pipeline* pipeline, const maq_predictor* made, double ahead_s, const maq_surprise* score,
+  const auto refused = [&](maq_context* in, const maq_predictor* made, double ahead_s, const maq_surprise* score,
                            const char* text) {
-    EXPECT_EQ(maq_pipeline_set_prediction(pipeline, made, ahead_s, score), MAQ_ERROR_INVALID_ARGUMENT);
+    maq_model* model = nullptr;
+    EXPECT_EQ(maq_prediction_model_create(in, made, ahead_s, score, &model), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
   };
-  refused(nullptr, right.get(), 0.1, nullptr, "pipeline is NULL");
-  refused(live.get(), nullptr, 0.1, nullptr, "predictor is NULL");
+  refused(nullptr, right.get(), 0.1, nullptr, "context is NULL");
+  refused(context.get(), nullptr, 0.1, nullptr, "predictor is NULL");
   for (const double wrong : {-0.01, 10.01, std::numeric_limits<double>::quiet_NaN()}) {
-    refused(live.get(), right.get(), wrong, nullptr, "ahead_s is");
+    refused(context.get(), right.get(), wrong, nullptr, "ahead_s is");
   }
-  refused(live.get(), reinterpret_cast<const maq_predictor*>(bits.get()), 0.1, nullptr, "predictor");
-  refused(live.get(), right.get(), 0.1, reinterpret_cast<const maq_surprise*>(right.get()), "surprise");
+  refused(context.get(), reinterpret_cast<const maq_predictor*>(bits.get()), 0.1, nullptr, "predictor");
+  refused(context.get(), right.get(), 0.1, reinterpret_cast<const maq_surprise*>(right.get()), "surprise");
 }
 
 }  // namespace

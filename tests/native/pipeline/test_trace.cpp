@@ -40,15 +40,13 @@ TEST(Trace, APipelineAlsoWaitsForFrames) {
   const maquette::Context context;
   fake_trace_record(true);
   fake_trace_sections();
-  maq_pipeline_config config;
-  maq_pipeline_config_init(&config, sizeof config);
   maq_densepose_config densepose;
   maq_densepose_config_init(&densepose, sizeof densepose);
   densepose.model.bundle_path = MAQ_TEST_MODELS "/densepose-b-int8";
   densepose.long_side_px = 256;
-  config.densepose = &densepose;
   {
-    maquette::Pipeline pipeline(context, config);
+    maquette::Pipeline pipeline(context);
+    pipeline.set_model(maquette::DensePoseModel(context, densepose));
     pipeline.set_source("stub:people?size=256x192&frames=1");
     while (pipeline.next()) {
     }

@@ -78,8 +78,9 @@ MAY_INCLUDE = {
     "sources/recording": BACKEND,
     "sources/files": BACKEND,
     "sources/synthetic": BACKEND | {"sources/recording"},
-    "pipeline": SYSTEMS | {"core/trace"},
-    "api": SYSTEMS | {"pipeline"},
+    "concealment": BASE - {"nn"} | {"prediction", "sources"},
+    "pipeline": {"core", "core/trace", "image", "sources", "sources/recording"},
+    "api": SYSTEMS | {"concealment", "pipeline"},
     "api/head": SYSTEMS | {"api"},
     "api/scene": SCENE | {"api"},
 }  # fmt: skip

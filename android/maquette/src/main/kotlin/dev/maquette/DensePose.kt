@@ -134,8 +134,9 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
 data class Person(val left: Float, val top: Float, val right: Float, val bottom: Float, val score: Float)
 
 /** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
-class DensePoseResult internal constructor(pointer: Long) : AutoCloseable {
-    internal val handle = Handle(this, pointer, Native::releaseResult)
+class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Unit = Native::releaseResult) :
+    AutoCloseable {
+    internal val handle = Handle(this, pointer, release)
 
     /** What is known of each pixel. */
     enum class Plane {

@@ -47,8 +47,8 @@ enum class Clock(internal val code: Int) {
 class Plane(val pixels: ByteBuffer, val strideBytes: Int = 0)
 
 /** An image with its time. Made by [Maquette]; not changed afterwards. */
-class Frame internal constructor(pointer: Long) : AutoCloseable {
-    internal val handle = Handle(this, pointer, Native::releaseFrame)
+class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native::releaseFrame) : AutoCloseable {
+    internal val handle = Handle(this, pointer, release)
     private val description = handle.use(Native::describeFrame)
 
     val widthPx: Int get() = description[0].toInt()

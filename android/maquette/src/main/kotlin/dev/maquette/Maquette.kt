@@ -287,7 +287,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
      */
     fun pipeline(bundle: ModelBundle, config: Pipeline.Config = Pipeline.Config()): Pipeline =
-        handle.use { context -> Pipeline(context, bundle, config) }
+        Pipeline(handle, bundle, config)
 
     /**
      * Opens a capture: a folder with a COLMAP model and its photos, or with `transforms.json` and a PLY cloud. Blocks

@@ -1,6 +1,7 @@
 package dev.maquette
 
 import dev.maquette.jni.NativePipeline
+import java.util.concurrent.atomic.AtomicInteger
 
 /**
  * Runs a source and dense pose on a thread of the library, for apps that must not block. The newest frame is processed;
@@ -13,27 +14,27 @@ import dev.maquette.jni.NativePipeline
  *
  * All functions may be called from any thread and, but for [acquireResult] and [close], do not block.
  */
-class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: Config) : AutoCloseable {
+class Pipeline internal constructor(private val context: Handle, bundle: ModelBundle, config: Config) : AutoCloseable {
+    private val frameBudgetMs = config.frameBudgetMs
+
+    @Volatile private var rollRad = 0f
+
+    @Volatile private var model = modelOf(bundle, config.densePose)
     internal val stateChanges =
         Changes { state, status, problem -> Change(State.entries[state], Status.of(status), problem) }
             .also { it.tell(Change(State.STOPPED, Status.OK, "")) }
     private val handle =
         Handle(
             this,
-            NativePipeline.create(
-                context,
-                bundle.folder,
-                bundle.names,
-                bundle.buffers,
-                config.densePose.values(),
-                config.source.values(),
-                config.resultPoolSize,
-                config.nice,
-                config.frameBudgetMs,
-                stateChanges,
-            ),
+            context.use {
+                NativePipeline.create(it, config.source.values(), config.resultPoolSize, config.nice, stateChanges)
+            },
             NativePipeline::destroy,
         )
+
+    init {
+        run(model)
+    }
 
     /**
      * @property resultPoolSize results, with their frames, that the app may hold at once, 1 to 64.
@@ -127,9 +128,10 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
     val stats: Stats
         get() {
             val s = handle.use(NativePipeline::stats)
+            val quality = withModel(NativePipeline::quality)
             return Stats(
                 s[0].toLong(), s[1].toLong(), s[2].toLong(), s[3], s[4], s[5], s[6].takeIf { it >= 0 },
-                s[7].toInt(), s[8].toInt(),
+                quality[0], quality[1],
             )
         }
 
@@ -148,13 +150,42 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
      */
     @Synchronized
-    fun setDensePose(bundle: ModelBundle, config: DensePose.Config = DensePose.Config()) =
-        handle.use {
-            NativePipeline.setDensePose(it, bundle.folder, bundle.names, bundle.buffers, config.values())
+    fun setDensePose(bundle: ModelBundle, config: DensePose.Config = DensePose.Config()) {
+        val next = modelOf(bundle, config)
+        run(next)
+        model.close()
+        model = next
+    }
+
+    private fun modelOf(bundle: ModelBundle, config: DensePose.Config): Handle {
+        val pointer =
+            context.use {
+                NativePipeline.createModel(it, bundle.folder, bundle.names, bundle.buffers, config.values())
+            }
+        return Handle(this, pointer, NativePipeline::destroyModel).also { made ->
+            made.use { NativePipeline.setFrameBudget(it, frameBudgetMs) }
+            made.use { NativePipeline.setRoll(it, rollRad) }
         }
+    }
+
+    private fun run(next: Handle) = next.use { made -> handle.use { NativePipeline.setModel(it, made) } }
+
+    private fun <T> withModel(work: (Long) -> T): T {
+        while (true) {
+            val current = model
+            try {
+                return current.use(work)
+            } catch (error: IllegalStateException) {
+                if (current === model) throw error // else it was replaced meanwhile
+            }
+        }
+    }
 
     /** [DensePose.setRoll] for the next frames, whatever the source and the model. */
-    fun setRoll(rollRad: Float) = handle.use { NativePipeline.setRoll(it, rollRad) }
+    fun setRoll(rollRad: Float) {
+        withModel { NativePipeline.setRoll(it, rollRad) }
+        this.rollRad = rollRad
+    }
 
     /** Pauses or resumes. The current frame is finished first; the source stays open. */
     fun setPaused(isPaused: Boolean) = handle.use { NativePipeline.setPaused(it, isPaused) }
@@ -174,7 +205,7 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
     }
 
     /** As [DensePose.surface]; null also before the networks are loaded. A result tells that they are. */
-    fun surface(): BodySurface? = handle.use(NativePipeline::surface)?.let(::BodySurface)
+    fun surface(): BodySurface? = withModel(NativePipeline::surface)?.let(::BodySurface)
 
     /**
      * Takes the newest result that was not taken yet, or waits for the next: not on the main thread.
@@ -185,11 +216,15 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
      *   open; and with the status of [info] when the source or the networks cannot be used.
      */
     fun acquireResult(timeoutMs: Long = WAIT_FOREVER): PipelineResult? {
-        val objects = LongArray(3)
+        val objects = LongArray(4)
         val times = DoubleArray(3)
         if (!handle.use { NativePipeline.acquire(it, nanoseconds(timeoutMs), objects, times) }) return null
+        val (result, frame, densePose, number) = objects
+        val openParts = AtomicInteger(2)
+        val release = { _: Long -> if (openParts.decrementAndGet() == 0) NativePipeline.releaseResult(result) }
         return PipelineResult(
-            Frame(objects[0]), DensePoseResult(objects[1]), objects[2], times[0], times[1], times[2].takeIf { it >= 0 },
+            Frame(frame, release), DensePoseResult(densePose, release), number, times[0], times[1],
+            times[2].takeIf { it >= 0 },
         )
     }
 
@@ -199,6 +234,7 @@ class Pipeline internal constructor(context: Long, bundle: ModelBundle, config: 
      */
     override fun close() {
         handle.closeAfter(NativePipeline::stop)
+        model.close()
         stateChanges.end()
     }
 }

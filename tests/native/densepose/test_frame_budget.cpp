@@ -1,5 +1,5 @@
 // The frame budget on simulated devices: run times by a model of its cost, a clock that counts them.
-#include "pipeline/frame_budget.h"
+#include "densepose/frame_budget.h"
 
 #include <gtest/gtest.h>
 
@@ -19,15 +19,15 @@ constexpr double kFullMs = 20;  // what a key frame takes at full size and speed
 // A device with a camera of 30 frames a second.
 class Device {
  public:
-  explicit Device(maq::FrameEffort full = {1, 288}, double budget_ms = kBudgetMs)
+  explicit Device(maq::DensePoseQuality full = {1, 288}, double budget_ms = kBudgetMs)
       : full_px_(full.long_side_px), budget_(budget_ms, full) {}
 
   // Runs for `seconds`; `speed` of the device at a time since the start, 1 when it is cool.
   void run(double seconds, const std::function<double(double)>& speed) {
     for (const double end_s = now_s() + seconds; now_s() < end_s;) {
-      const maq::FrameEffort effort = budget_.effort();
-      const bool is_key = frame_++ % effort.key_frame_interval == 0;
-      const double side = double(effort.long_side_px) / full_px_;
+      const maq::DensePoseQuality quality = budget_.quality();
+      const bool is_key = frame_++ % quality.key_frame_interval == 0;
+      const double side = double(quality.long_side_px) / full_px_;
       // A third does not depend on the size of the input.
       const double cost = (is_key ? 1 : 0.8) * (0.33 + 0.67 * side * side);
       const double ms = kFullMs * cost / speed(now_s()) * noise_();
@@ -49,8 +49,8 @@ class Device {
   }
 
   double now_s() const { return std::chrono::duration<double>(now_).count(); }
-  const maq::FrameEffort& effort() const { return budget_.effort(); }
-  bool is_full() const { return effort().key_frame_interval == 1 && effort().long_side_px == full_px_; }
+  const maq::DensePoseQuality& quality() const { return budget_.quality(); }
+  bool is_full() const { return quality().key_frame_interval == 1 && quality().long_side_px == full_px_; }
   int changes() const { return changes_; }
   int late() const { return late_; }
   int met_at_the_end() const { return met_; }  // frames in a row
@@ -76,12 +76,12 @@ TEST(FrameBudget, ADeviceThatKeepsUpIsLeftAlone) {
 TEST(FrameBudget, KeyFramesBecomeRarerBeforeTheInputBecomesSmaller) {
   Device device;
   device.run(10, 20 / 31.0);  // 31 ms: a little too much
-  EXPECT_GT(device.effort().key_frame_interval, 1);
-  EXPECT_EQ(device.effort().long_side_px, 288);
+  EXPECT_GT(device.quality().key_frame_interval, 1);
+  EXPECT_EQ(device.quality().long_side_px, 288);
   EXPECT_EQ(device.changes(), 1);
   device.run(10, 20 / 40.0);
-  EXPECT_EQ(device.effort().key_frame_interval, 4);
-  EXPECT_LT(device.effort().long_side_px, 288);
+  EXPECT_EQ(device.quality().key_frame_interval, 4);
+  EXPECT_LT(device.quality().long_side_px, 288);
 }
 
 TEST(FrameBudget, AfterASuddenThrottleToAThirdDeadlinesAreMetAgainWithinTwoWindows) {
@@ -104,12 +104,12 @@ TEST(FrameBudget, WhileADeviceHeatsUpSlowlyFewFramesAreLate) {
 TEST(FrameBudget, WhatWasLostComesBackStepByStepWhenTheDeviceIsCool) {
   Device device;
   device.run(10, 1 / 3.0);
-  const maq::FrameEffort least = device.effort();
+  const maq::DensePoseQuality least = device.quality();
   device.forget();
   device.run(4, 1);
-  EXPECT_EQ(device.effort().long_side_px, least.long_side_px) << "not before some seconds";
+  EXPECT_EQ(device.quality().long_side_px, least.long_side_px) << "not before some seconds";
   device.run(8, 1);
-  EXPECT_GT(device.effort().long_side_px, least.long_side_px);
+  EXPECT_GT(device.quality().long_side_px, least.long_side_px);
   EXPECT_FALSE(device.is_full());
   device.run(60, 1);
   EXPECT_TRUE(device.is_full());
@@ -138,21 +138,21 @@ TEST(FrameBudget, FramesThatOtherProgramsDelayChangeLittle) {
 TEST(FrameBudget, WhereNothingIsEnoughItStaysAtTheLeast) {
   Device device;
   device.run(60, 0.05);
-  EXPECT_EQ(device.effort().key_frame_interval, 4);
-  EXPECT_EQ(device.effort().long_side_px, 160) << "no less than half of 288";
+  EXPECT_EQ(device.quality().key_frame_interval, 4);
+  EXPECT_EQ(device.quality().long_side_px, 160) << "no less than half of 288";
   EXPECT_LE(device.changes(), 2);
 }
 
 TEST(FrameBudget, WhatTheAppAskedForIsNeverExceeded) {
-  for (const maq::FrameEffort full : {maq::FrameEffort{8, 256}, {3, 200}, {1, 32}, {1000, 33}, {2, 2048}}) {
+  for (const maq::DensePoseQuality full : {maq::DensePoseQuality{8, 256}, {3, 200}, {1, 32}, {1000, 33}, {2, 2048}}) {
     Device device(full);
     device.run(30, 0.01);
-    EXPECT_GE(device.effort().key_frame_interval, full.key_frame_interval);
-    EXPECT_LE(device.effort().long_side_px, full.long_side_px);
-    EXPECT_GE(2 * device.effort().long_side_px, full.long_side_px);
+    EXPECT_GE(device.quality().key_frame_interval, full.key_frame_interval);
+    EXPECT_LE(device.quality().long_side_px, full.long_side_px);
+    EXPECT_GE(2 * device.quality().long_side_px, full.long_side_px);
     device.run(3600, 100);
-    EXPECT_EQ(device.effort().key_frame_interval, full.key_frame_interval);
-    EXPECT_EQ(device.effort().long_side_px, full.long_side_px);
+    EXPECT_EQ(device.quality().key_frame_interval, full.key_frame_interval);
+    EXPECT_EQ(device.quality().long_side_px, full.long_side_px);
   }
 }
 

@@ -1,4 +1,4 @@
-#include "pipeline/concealer.h"
+#include "concealment/concealer.h"
 
 #include <algorithm>
 #include <array>

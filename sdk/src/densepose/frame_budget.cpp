@@ -1,4 +1,4 @@
-#include "pipeline/frame_budget.h"
+#include "densepose/frame_budget.h"
 
 #include <algorithm>
 
@@ -19,7 +19,7 @@ double cost_of_key_frames(int interval) { return interval >= 4 ? 0.87 : interval
 
 }  // namespace
 
-FrameBudget::FrameBudget(double budget_ms, const FrameEffort& full)
+FrameBudget::FrameBudget(double budget_ms, const DensePoseQuality& full)
     : budget_ms_(budget_ms), levels_{full}, patience_(kPatience) {
   for (const int interval : kKeyFrameIntervals) {
     if (interval > full.key_frame_interval) levels_.push_back({interval, full.long_side_px});

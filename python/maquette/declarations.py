@@ -21,7 +21,11 @@ def declarations(headers: Path) -> str:
     """What cffi's `cdef` takes, out of the folder of maquette.h. Constants come as enumerators, since `cdef` reads no
     expressions in a #define."""
     parts = []
-    for name in re.findall(r'^#include "maquette/(\w+\.h)"$', (headers / "maquette.h").read_text(), re.MULTILINE):
+    features = (headers / "features.h").read_text()
+    umbrella = (headers / "maquette.h").read_text()
+    for feature in re.findall(r"^#define (MAQ_HAS_\w+) 0$", features, re.MULTILINE):  # its headers are not installed
+        umbrella = re.sub(rf"^#if {feature}$.*?^#endif$", "", umbrella, flags=re.DOTALL | re.MULTILINE)
+    for name in re.findall(r'^#include "maquette/(\w+\.h)"$', umbrella, re.MULTILINE):
         parts += _with_what_it_includes(headers, name, parts)
     return "\n".join(parts)
 

@@ -73,7 +73,12 @@ class Native:
 
     def ask(self, function: str, *arguments: Any) -> int:
         """The same, but returns the status."""
-        return getattr(self.lib, function)(*arguments)
+        try:
+            called = getattr(self.lib, function)
+        except AttributeError:
+            text = f"This build of libmaquette has no {function}; build it with every MAQ_WITH_… switch on."
+            raise MaquetteError(text, "MAQ_ERROR_UNSUPPORTED") from None
+        return called(*arguments)
 
     def fail(self, function: str, status: int) -> None:
         text = self.lib.maq_last_error(self.ffi.NULL)

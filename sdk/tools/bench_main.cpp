@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "arguments/model_options.h"
+#include "arguments/densepose_options.h"
 #include "arguments/source_argument.h"
 #include "bench/prediction_bench.h"
 #include "bench/stage_times.h"

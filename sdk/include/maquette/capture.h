@@ -2,24 +2,13 @@
 #ifndef MAQUETTE_CAPTURE_H_
 #define MAQUETTE_CAPTURE_H_
 
-#include "maquette/source.h"
+#include "maquette/pinhole_camera.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
 typedef struct maq_capture maq_capture;
-
-/* A camera and its pose, in the convention of OpenCV: x to the right, y down, z forward. A point X of the world
- * has the camera coordinates rotation * (X - centre). Lengths are in the unit of the point cloud ("units of the
- * scene"). */
-typedef struct maq_pinhole_camera {
-  uint32_t struct_size;
-  maq_intrinsics intrinsics; /* of the photo, or of the picture to render; photos are undistorted by the library,
-                                pictures are rendered without distortion */
-  double rotation[9];        /* world to camera, row-major; right-handed and orthonormal (to 0.001) */
-  double centre[3];          /* the camera's position in the world */
-} maq_pinhole_camera;
 
 typedef struct maq_capture_info {
   uint32_t struct_size;

@@ -26,11 +26,10 @@ MAQ_API maq_status maq_densepose_model_create(maq_context* context, const maq_de
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_model_set_roll(maq_model* model, float roll_rad);
 
-/* Limits the mean time that dense pose takes for a frame of a stream, for devices that throttle: up to 60000 ms; 0 (at
- * first): no limit. If frames take longer, people are detected in every 2nd and then every 4th frame. After that,
- * long_side_px falls in steps of 32 pixels, to no less than half. Both return step by step when there has been time for
- * some seconds.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+/* Limits the mean time that dense pose takes for a frame of a stream, for devices that throttle. `budget_ms`: up to
+ * 60000; 0 (at first): no limit. If frames take longer, people are detected in every 2nd and then every 4th frame.
+ * After that, long_side_px falls in steps of 32 pixels, to no less than half. Both return step by step when there has
+ * been time for some seconds. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_model_set_frame_budget(maq_model* model, double budget_ms);
 
 /* Gets the quality in use. The caller sets stats->struct_size.

@@ -11,8 +11,8 @@
 #ifndef MAQUETTE_EDGES_FUSION_H_
 #define MAQUETTE_EDGES_FUSION_H_
 
-#include "maquette/capture.h"
 #include "maquette/edge_curves.h"
+#include "maquette/pinhole_camera.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -13,7 +13,7 @@
 #ifndef MAQUETTE_HEAD_H_
 #define MAQUETTE_HEAD_H_
 
-#include "maquette/capture.h"
+#include "maquette/pinhole_camera.h"
 
 #ifdef __cplusplus
 extern "C" {

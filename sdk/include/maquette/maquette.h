@@ -59,24 +59,36 @@
 #ifndef MAQUETTE_MAQUETTE_H_
 #define MAQUETTE_MAQUETTE_H_
 
-#include "maquette/capture.h"
+#include "maquette/features.h"
+
 #include "maquette/clip.h"
-#include "maquette/concealer.h"
 #include "maquette/context.h"
+#include "maquette/frame.h"
+#include "maquette/pipeline.h"
+#include "maquette/recorder.h"
+#include "maquette/source.h"
+#include "maquette/types.h"
+#if MAQ_HAS_DENSEPOSE
 #include "maquette/densepose.h"
 #include "maquette/densepose_model.h"
+#endif
+#if MAQ_HAS_SCENES
+#include "maquette/capture.h"
+#include "maquette/scene.h"
+#endif
+#if MAQ_HAS_EDGES
 #include "maquette/edge_curves.h"
 #include "maquette/edges.h"
 #include "maquette/edges_fusion.h"
 #include "maquette/edges_model.h"
-#include "maquette/frame.h"
+#endif
+#if MAQ_HAS_HEADS
 #include "maquette/head.h"
-#include "maquette/pipeline.h"
+#endif
+#if MAQ_HAS_PREDICTION
+#include "maquette/concealer.h"
 #include "maquette/prediction.h"
 #include "maquette/prediction_model.h"
-#include "maquette/recorder.h"
-#include "maquette/scene.h"
-#include "maquette/source.h"
-#include "maquette/types.h"
+#endif
 
 #endif /* MAQUETTE_MAQUETTE_H_ */

@@ -14,17 +14,27 @@
 #define MAQUETTE_MAQUETTE_HPP_
 
 #include "maquette/context.hpp"
-#include "maquette/densepose.hpp"
-#include "maquette/densepose_model.hpp"
-#include "maquette/edges.hpp"
-#include "maquette/edges_model.hpp"
 #include "maquette/frame.hpp"
-#include "maquette/head.hpp"
 #include "maquette/maquette.h"
 #include "maquette/pipeline.hpp"
+#include "maquette/source.hpp"
+#if MAQ_HAS_DENSEPOSE
+#include "maquette/densepose.hpp"
+#include "maquette/densepose_model.hpp"
+#endif
+#if MAQ_HAS_SCENES
+#include "maquette/scene.hpp"
+#endif
+#if MAQ_HAS_EDGES
+#include "maquette/edges.hpp"
+#include "maquette/edges_model.hpp"
+#endif
+#if MAQ_HAS_HEADS
+#include "maquette/head.hpp"
+#endif
+#if MAQ_HAS_PREDICTION
 #include "maquette/prediction.hpp"
 #include "maquette/prediction_model.hpp"
-#include "maquette/scene.hpp"
-#include "maquette/source.hpp"
+#endif
 
 #endif  // MAQUETTE_MAQUETTE_HPP_

@@ -83,12 +83,12 @@ typedef struct maq_pipeline_result_stats {
 
 typedef struct maq_pipeline_stats {
   uint32_t struct_size;
-  uint64_t result_count;         /* results so far */
-  uint64_t dropped_result_count; /* results that were replaced by a newer one before the app took them, or that came
-                                    while the app held result_pool_size results */
-  uint64_t dropped_frame_count;  /* frames of the current source that the camera lost, or that came while the model was
-                                    busy */
-  double results_per_second;     /* over the last second */
+  uint64_t result_count;          /* results so far */
+  uint64_t dropped_result_count;  /* results that were replaced by a newer one before the app took them, or that came
+                                     while the app held result_pool_size results */
+  uint64_t dropped_frame_count;   /* frames of the current source that the camera lost, or that came while the model was
+                                     busy */
+  double results_per_second;      /* over the last second */
   double wait_ms, run_ms, age_ms; /* of the latest result (maq_pipeline_result_stats) */
 } maq_pipeline_stats;
 
@@ -118,9 +118,9 @@ MAQ_API void maq_pipeline_destroy(maq_pipeline* pipeline);
 MAQ_API maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri);
 
 /* Loads a model in place of the current one. NULL: no model runs, and results have a frame only. The source stays open;
- * a photo is processed again. The app may destroy its handle after the call. After MAQ_PIPELINE_FAILED, source and model
- * are tried again. maq_pipeline_info reports errors of the loading.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another pipeline runs the model). Does not block. */
+ * a photo is processed again. The app may destroy its handle after the call. After MAQ_PIPELINE_FAILED, source and
+ * model are tried again. maq_pipeline_info reports errors of the loading. Any thread. Errors:
+ * MAQ_ERROR_INVALID_ARGUMENT (another pipeline runs the model). Does not block. */
 MAQ_API maq_status maq_pipeline_set_model(maq_pipeline* pipeline, maq_model* model);
 
 /* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
@@ -144,8 +144,8 @@ MAQ_API maq_status maq_pipeline_stop(maq_pipeline* pipeline);
 /* Takes the newest result that was not taken yet. Otherwise waits for the next one, for at most `timeout_ns`
  * (MAQ_WAIT_FOREVER: without limit). Give `*result` back with maq_pipeline_result_release.
  * Any thread. Errors: MAQ_TIMEOUT, MAQ_END_OF_STREAM, MAQ_CANCELLED (the pipeline is stopped), MAQ_ERROR_POOL_EMPTY
- * (all results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT; when the
- * pipeline failed, the status of maq_pipeline_info. Blocks until there is a result. */
+ * (all results are held), MAQ_ERROR_UNSUPPORTED (it has a result_callback), MAQ_ERROR_INVALID_ARGUMENT. If the pipeline
+ * failed: the status of maq_pipeline_info. Blocks until there is a result. */
 MAQ_API maq_status maq_pipeline_acquire_result(maq_pipeline* pipeline, int64_t timeout_ns,
                                                maq_pipeline_result** result);
 

@@ -1,6 +1,5 @@
 #include "api/boundary.h"
 #include "core/build_info.h"
-#include "prediction/predictor_workspace.h"
 
 using namespace maq;
 
@@ -68,9 +67,8 @@ maq_status maq_context_create(uint32_t header_version, const maq_context_config*
     const maq_context_config config = read_config(given, "config", default_context_config());
     require_range("config.log_level", number_in(config.log_level), int32_t(MAQ_LOG_OFF), int32_t(MAQ_LOG_DEBUG));
     const char* library = config.onnxruntime_library;
-    *context = new maq_context(
-        std::make_shared<ContextState>(Log(config.log_level, config.log_callback, config.log_user_data),
-                                       library == nullptr ? "" : library, std::make_shared<PredictorWorkspaces>()));
+    *context = new maq_context(std::make_shared<ContextState>(
+        Log(config.log_level, config.log_callback, config.log_user_data), library == nullptr ? "" : library));
     return MAQ_OK;
   });
 }

@@ -6,7 +6,7 @@
 
 #include "api/boundary.h"
 #include "image/geometry/pinhole_camera.h"
-#include "maquette/capture.h"
+#include "maquette/pinhole_camera.h"
 
 namespace maq {
 

@@ -62,11 +62,11 @@ class PredictorWorkspaces;
 // What the objects made from a context keep of it when it is destroyed before them.
 class ContextState {
  public:
-  ContextState(Log log, std::string onnxruntime_path, std::shared_ptr<PredictorWorkspaces> workspaces)
-      : log_(log), onnxruntime_path_(std::move(onnxruntime_path)), predictor_workspaces_(std::move(workspaces)) {}
+  ContextState(Log log, std::string onnxruntime_path) : log_(log), onnxruntime_path_(std::move(onnxruntime_path)) {}
 
   const Log& log() const { return log_; }
-  const std::shared_ptr<PredictorWorkspaces>& predictor_workspaces() const { return predictor_workspaces_; }
+  // Memory that the predictors of the context share, made at the first call. In builds with prediction.
+  std::shared_ptr<PredictorWorkspaces> predictor_workspaces() const;
 
   // Opens the library at the first call; tries again after a failure.
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime() {
@@ -78,8 +78,8 @@ class ContextState {
  private:
   Log log_;
   std::string onnxruntime_path_;
-  const std::shared_ptr<PredictorWorkspaces> predictor_workspaces_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  mutable std::shared_ptr<PredictorWorkspaces> predictor_workspaces_;
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime_;
 };
 

@@ -27,7 +27,7 @@ constexpr size_t kSteps = 9, kKnownSteps = 5;
 
 }  // namespace
 
-// What the concealer and its thread share.
+// The state that the concealer and its thread share.
 struct Concealer::State {
   const std::shared_ptr<Source> source;
   const int64_t max_gap_ns;
@@ -42,7 +42,7 @@ struct Concealer::State {
   std::exception_ptr failure;
   ConcealerStats counts;
 
-  // Of the thread alone.
+  // The thread alone uses these.
   Predictor predictor;
   Frame captured, made_up;
   bool has_made_up = false;                       // `made_up` is there for the next frame that does not come
@@ -136,7 +136,7 @@ struct Concealer::State {
     latest_steps_ns[step_count % kSteps] = step_ns;
     const size_t known = std::min(step_count - 1, kSteps);
     if (known < kKnownSteps) return;
-    // Those not known yet are 0, the smallest.
+    // Steps that are not known yet are 0, the smallest.
     const size_t middle = kSteps - known + known / 2;
     for (const int64_t median_ns : latest_steps_ns) {
       size_t smaller = 0, equal = 0;

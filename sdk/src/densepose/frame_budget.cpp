@@ -14,7 +14,7 @@ constexpr double kFull = 0.9, kHasTime = 0.8;
 // phone that is warm throttles again at once.
 constexpr std::chrono::seconds kPatience(5), kMaxPatience(80);
 
-// Of a frame, in the mean, where one in `interval` is a key frame: measured (docs/research/dense-pose.md).
+// Returns the mean cost of a frame if one in `interval` is a key frame, as measured (docs/research/dense-pose.md).
 double cost_of_key_frames(int interval) { return interval >= 4 ? 0.87 : interval >= 2 ? 0.93 : 1; }
 
 }  // namespace

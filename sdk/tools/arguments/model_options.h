@@ -1,4 +1,4 @@
-// Options of the commands that run networks: which bundle, what runs it, and for people what may be left out.
+// Options of the commands that run networks: the bundle, and the threads and the provider that run it.
 #pragma once
 
 #include <maquette/maquette.h>
@@ -20,24 +20,5 @@ void add_network_options(CLI::App& command, NetworkOptions& options, const std::
 
 maq_provider provider_of(const NetworkOptions& options);
 
-struct ModelOptions : NetworkOptions {
-  int size = 0;
-  float threshold = 0;
-  int max_proposals = 0;
-  int key_frames = 0;
-  int min_person_height_px = 0;
-  std::string crops = "off";
-  int crop_px = 0;
-  bool no_surface = false;
-};
-
-void add_model_options(CLI::App& command, ModelOptions& options);
-
-// The folder of the bundle that was named, or else of the default one. Throws std::runtime_error without any.
-std::string bundle_of(const ModelOptions& options);
-
-// As --provider has it.
+// The name as --provider takes it.
 const char* name_of(maq_provider provider);
-
-// `bundle` must outlive the configuration.
-maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle);

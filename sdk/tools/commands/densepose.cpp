@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "arguments/model_options.h"
+#include "arguments/densepose_options.h"
 #include "commands/commands.h"
 #include "commands/source_frames.h"
 #include "output/clip_file.h"

@@ -240,10 +240,14 @@ void add_edges_command(CLI::App& app, int* exit_code) {
       "  maquette edges 'stub:solids?scene=shelf&noise=tof' --out results --overlay --max-frames 60\n"
       "  maquette edges rec:desk.maqrec --out results --boxes --json\n"
       "  maquette edges depthai: --out results --boxes --average 16 --max-frames 32\n"
+#if MAQ_HAS_SCENES
       "  maquette edges build scan --out model.dxf\n"
+#endif
       "  maquette edges info");
   command->require_subcommand(0, 1);
+#if MAQ_HAS_SCENES  // captures
   add_edges_build_command(*command, exit_code);
+#endif
   add_edges_info_command(*command, exit_code);
   command->callback([=] {
     if (!command->get_subcommands().empty()) return;

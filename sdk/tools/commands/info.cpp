@@ -1,12 +1,26 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <maquette/maquette.hpp>
+#include <string>
 
 #include "arguments/bundle_argument.h"
 #include "commands/commands.h"
 #include "print.h"
 
 namespace {
+
+std::string systems() {
+  std::string names;
+  const auto add = [&](bool is_in, const char* name) {
+    if (is_in) names += (names.empty() ? "" : ", ") + std::string(name);
+  };
+  add(MAQ_HAS_DENSEPOSE, "densepose");
+  add(MAQ_HAS_SCENES, "scenes");
+  add(MAQ_HAS_EDGES, "edges");
+  add(MAQ_HAS_HEADS, "heads");
+  add(MAQ_HAS_PREDICTION, "prediction");
+  return names.empty() ? "none: cameras, files and pipelines" : names;
+}
 
 int print_info() {
   print_output("Maquette       %s (commit %s)\n", maq_get_sdk_version(), maq_get_git_commit());
@@ -20,6 +34,8 @@ int print_info() {
     print_output("ONNX Runtime   missing: %s\n", error.what());
     exit_code = 1;
   }
+  print_output("Systems        %s\n", systems().c_str());
+#if MAQ_HAS_DENSEPOSE
   const std::string bundle = default_bundle();
   std::error_code error;
   if (bundle.empty()) {
@@ -31,13 +47,14 @@ int print_info() {
   } else {
     print_output("Model bundle   %s\n", bundle.c_str());
   }
+#endif
   return exit_code;
 }
 
 }  // namespace
 
 void add_info_command(CLI::App& app, int* exit_code) {
-  CLI::App* command =
-      app.add_subcommand("info", "Print the versions, and the paths of ONNX Runtime and the model bundle");
+  CLI::App* command = app.add_subcommand(
+      "info", "Print the versions, the systems in this build, and the paths of ONNX Runtime and the model bundle");
   command->callback([=] { *exit_code = print_info(); });
 }

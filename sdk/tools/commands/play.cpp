@@ -62,12 +62,22 @@ int play(const PlayOptions& options) {
   config.state_callback = PlayStatistics::note_state;
   config.state_user_data = &statistics;
   maquette::Source source(context, uri, &config);
+#if MAQ_HAS_PREDICTION
   std::unique_ptr<maquette::Concealer> concealer;
   if (options.conceal) {
     maq_concealer_config how = maquette::default_concealer_config();
     how.max_gap_ms = options.max_gap_ms;
     concealer = std::make_unique<maquette::Concealer>(context, source, how);
   }
+  const auto acquire = [&](int64_t timeout_ns, maq_frame** frame) {
+    return concealer ? maq_concealer_acquire_frame(concealer->get(), timeout_ns, frame)
+                     : maq_source_acquire_frame(source.get(), timeout_ns, frame);
+  };
+#else
+  const auto acquire = [&](int64_t timeout_ns, maq_frame** frame) {
+    return maq_source_acquire_frame(source.get(), timeout_ns, frame);
+  };
+#endif
   is_opening = false;
   std::optional<StoppedByInterrupt> stopped(source);
   if (options.from_s > 0) source.seek(int64_t(options.from_s * 1e9));
@@ -79,8 +89,7 @@ int play(const PlayOptions& options) {
   while (!interrupted() && monotonic_ns() < end_ns && (options.frames == 0 || statistics.frames() < options.frames)) {
     constexpr int64_t kPatienceNs = 250000000;  // how late --seconds may end while no frame comes
     maq_frame* taken = nullptr;
-    const maq_status status = concealer ? maq_concealer_acquire_frame(concealer->get(), kPatienceNs, &taken)
-                                        : maq_source_acquire_frame(source.get(), kPatienceNs, &taken);
+    const maq_status status = acquire(kPatienceNs, &taken);
     if (status == MAQ_TIMEOUT) continue;
     if (status == MAQ_END_OF_STREAM || status == MAQ_CANCELLED) break;
     if (status != MAQ_OK) {
@@ -108,8 +117,10 @@ int play(const PlayOptions& options) {
               std::to_string(info.dropped_frame_count) + ".";
   }
   stopped.reset();
-  if (concealer) statistics.set_concealer(concealer->stats());
+#if MAQ_HAS_PREDICTION
+  if (concealer) statistics.set_concealed(concealer->stats().late_count, concealer->stats().max_wait_ms);
   concealer.reset();
+#endif
   statistics.close(std::move(source));
   statistics.print(info);
   if (!options.json.empty()) write_json_file(options.json, statistics.report(info), 1);
@@ -132,11 +143,13 @@ void add_play_command(CLI::App& app, int* exit_code) {
   command->add_option("-t,--seconds", options->seconds, "Stop after this time, in seconds")->check(CLI::PositiveNumber);
   command->add_flag_callback(
       "--no-picture", [=] { options->picture = false; }, "Print only statistics; default without a terminal");
+#if MAQ_HAS_PREDICTION
   CLI::Option* conceal = command->add_flag(
       "--conceal", options->conceal, "Bridge short gaps with predicted frames; the line below the picture says which");
   command->add_option("--max-gap", options->max_gap_ms, "Bridge so many milliseconds at most; default: 300")
       ->needs(conceal)
       ->check(CLI::Range(1, 10000));
+#endif
   command->add_option("--json", options->json, "Write the statistics to this file");
   command->footer(
       "Plays frames in real time, also from files. A terminal shows the picture in colour. Missing and late "
@@ -144,7 +157,9 @@ void add_play_command(CLI::App& app, int* exit_code) {
       "and interruptions are counted:\n\n"
       "  maquette play v4l2:/dev/video0\n"
       "  maquette play take.maqrec --from 5 --speed 0.5\n"
-      "  maquette play 'stub:people?drop=0.1&unplug=3s@5s'\n"
-      "  maquette play 'stub:people?stall=300ms@3s' --conceal");
+#if MAQ_HAS_PREDICTION
+      "  maquette play 'stub:people?stall=300ms@3s' --conceal\n"
+#endif
+      "  maquette play 'stub:people?drop=0.1&unplug=3s@5s'");
   command->callback([=] { *exit_code = play(*options); });
 }

@@ -115,10 +115,10 @@ nlohmann::ordered_json PlayStatistics::report(const maq_source_info& info) const
   if (!ages_ms_.empty()) {
     report["age_ms"] = {{"median", quantile(ages_ms_, .5)}, {"p99", quantile(ages_ms_, .99)}};
   }
-  if (concealer_) {
+  if (concealed_) {
     report["concealed"] = {{"predicted_frames", predicted_},
-                           {"late_frames", concealer_->late_count},
-                           {"max_wait_ms", concealer_->max_wait_ms}};
+                           {"late_frames", concealed_->late_count},
+                           {"max_wait_ms", concealed_->max_wait_ms}};
   }
   double last_frame_s = 0;
   std::lock_guard<std::mutex> lock(mutex_);
@@ -144,10 +144,10 @@ void PlayStatistics::print(const maq_source_info& info) const {
     print_output("  age at delivery      %.2f ms (median), %.2f ms (p99)\n", all["age_ms"]["median"].get<double>(),
                  all["age_ms"]["p99"].get<double>());
   }
-  if (concealer_) {
+  if (concealed_) {
     print_output("  predicted frames     %" PRId64 ", there %.2f ms after they were due at most; %" PRIu64
                  " frames came after them, too late\n",
-                 predicted_, double(concealer_->max_wait_ms), concealer_->late_count);
+                 predicted_, double(concealed_->max_wait_ms), concealed_->late_count);
   }
   print_output("  CPU                  %.1f %% of one core\n", all["cpu_utilization"].get<double>() * 100);
   for (const auto& event : all["events"]) {

@@ -22,8 +22,8 @@ class PlayStatistics {
 
   // One that was predicted in place of a frame that was not there: counted apart.
   void add_predicted() { ++predicted_; }
-  // What the concealer says at the end.
-  void set_concealer(const maq_concealer_stats& stats) { concealer_ = stats; }
+  // Results of the concealer at the end: frames that came too late, and the longest wait.
+  void set_concealed(uint64_t late_count, float max_wait_ms) { concealed_ = Concealed{late_count, max_wait_ms}; }
 
   int64_t frames() const { return int64_t(timestamps_ns_.size()); }
   // Frames a second over the last second or so.
@@ -48,7 +48,11 @@ class PlayStatistics {
   double processor_s_;
   double close_ms_ = 0;
   int64_t predicted_ = 0;
-  std::optional<maq_concealer_stats> concealer_;
+  struct Concealed {
+    uint64_t late_count;
+    float max_wait_ms;
+  };
+  std::optional<Concealed> concealed_;
   std::vector<int64_t> timestamps_ns_;
   std::vector<float> ages_ms_;  // of frames with times of the monotonic clock
   std::vector<double> arrivals_s_;

@@ -79,7 +79,7 @@ TEST_F(Concealer, AStallOf200MsIsBridgedAtTheSourcesRate) {
   EXPECT_GE(stats.captured_count, 40u);
   EXPECT_GT(stats.latest_gap_ms, 0);
   EXPECT_GE(stats.max_wait_ms, stats.latest_wait_ms);
-  // Of times, not of clocks: within the stall they go on at the rate.
+  // Compares times, not clocks: within the stall they go on at the rate.
   int bridged = 0;
   for (size_t i = 1; i < all.size(); ++i) {
     if (all[i].is_predicted() && all[i - 1].is_predicted()) {

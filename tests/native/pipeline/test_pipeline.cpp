@@ -705,7 +705,6 @@ TEST(Pipeline, WithoutAModelResultsHaveAFrameOnly) {
   ASSERT_TRUE(result.has_value());
   EXPECT_EQ(result->frame.desc().width_px, 64);
   EXPECT_EQ(maquette::densepose_of(*result).get(), nullptr);
-  EXPECT_FALSE(maquette::edges_of(*result).has_value());
   EXPECT_FALSE(pipeline.next().has_value());
 }
 
@@ -740,7 +739,6 @@ TEST(Pipeline, PartsOfAResultAreGivenBackWithIt) {
   int32_t width_px = 0;
   EXPECT_EQ(maq_densepose_result_get_size(people, &width_px, nullptr), MAQ_OK);
   EXPECT_EQ(width_px, 64);
-  EXPECT_EQ(maq_pipeline_result_get_edges(result), nullptr);
   maq_pipeline_result_release(result);
   EXPECT_EQ(maq_frame_get_desc(frame, &desc), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_densepose_result_get_size(people, &width_px, nullptr), MAQ_ERROR_INVALID_ARGUMENT);

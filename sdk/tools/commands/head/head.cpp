@@ -134,6 +134,7 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     for (Photo& photo : photos) photo.heads = {{options.box[0], options.box[1], options.box[2], options.box[3]}};
     return;
   }
+#if MAQ_HAS_DENSEPOSE
   const std::string bundle = options.densepose.empty() ? default_bundle() : options.densepose;
   if (bundle.empty()) {
     print_error(
@@ -160,6 +161,10 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     const auto is_empty = [&](const Photo& photo) { return photo.is_of_clip && !shows_somebody(photo); };
     photos.erase(std::remove_if(photos.begin(), photos.end(), is_empty), photos.end());
   }
+#else
+  (void)context;
+  print_error("This build has no dense pose, so the head is detected in the middle of the photo; see --box.\n");
+#endif
 }
 
 // head.glb -> head_2.glb.
@@ -507,8 +512,10 @@ void add_head_command(CLI::App& app, int* exit_code) {
       ->add_flag("--unlit", options->is_unlit,
                  "Take the photos' light from one side out of the texture, for programs that light it anew")
       ->needs(texture);
+#if MAQ_HAS_DENSEPOSE
   command->add_option("--densepose", options->densepose,
                       "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");
+#endif
   command->add_flag("--json", options->json, "Print what was found as one JSON line per head");
   add_network_options(*command, options->network, "MAQ_HEADS_BUNDLE");
   command->footer(

@@ -3,7 +3,7 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/edges_handle.h"
+#include "api/edges/edges_handle.h"
 #include "api/model_handle.h"
 #include "maquette/edges_model.h"
 
@@ -90,8 +90,8 @@ maq_status maq_edges_model_create(maq_context* context, const maq_edges_config* 
     const EdgesSettings settings = edges_settings(config, "config");
     std::optional<CurveRequest> request;
     if (curves != nullptr) request = curve_request(curves, "curves");
-    *model = new maq_model(std::make_shared<EdgesModel>(
-        context->state, bundle_reader(config, "config", kEdgesBundle), settings, request, config.result_pool_size));
+    *model = new maq_model(std::make_shared<EdgesModel>(context->state, bundle_reader(config, "config", kEdgesBundle),
+                                                        settings, request, config.result_pool_size));
     return MAQ_OK;
   });
 }

@@ -18,7 +18,7 @@ maq_edges_config read_edges_config(const maq_edges_config* given, const char* na
 // Throws ArgumentError for what is out of range; `name` is that of the config.
 EdgesSettings edges_settings(const maq_edges_config& config, const char* name);
 
-// What a config asks for, checked; `name` begins error texts.
+// Checks a config and converts it to a request; `name` begins error texts.
 CurveRequest curve_request(const maq_edges_curves_config* given, const char* name);
 
 }  // namespace maq

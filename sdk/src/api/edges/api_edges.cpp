@@ -4,7 +4,7 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/edges_handle.h"
+#include "api/edges/edges_handle.h"
 #include "api/frame_handle.h"
 #include "core/worker_threads.h"
 #include "edges/field_files.h"

@@ -4,7 +4,7 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/densepose_handle.h"
+#include "api/densepose/densepose_handle.h"
 #include "api/model_handle.h"
 #include "core/clock.h"
 #include "densepose/frame_budget.h"
@@ -101,9 +101,8 @@ class DensePoseModel : public LiveModel {
     if (!budget_ || !budget_->add(end, run_ms)) return;
     const DensePoseQuality& quality = budget_->quality();
     set_quality(quality);
-    state_->log().write(MAQ_LOG_INFO, "A frame took ", run_ms, " ms, of ", budget_ms,
-                        ": from now on one key frame in ", quality.key_frame_interval, ", long side ",
-                        quality.long_side_px, " px");
+    state_->log().write(MAQ_LOG_INFO, "A frame took ", run_ms, " ms, of ", budget_ms, ": from now on one key frame in ",
+                        quality.key_frame_interval, ", long side ", quality.long_side_px, " px");
   }
 
   void set_quality(const DensePoseQuality& quality) {
@@ -118,12 +117,12 @@ class DensePoseModel : public LiveModel {
   std::atomic<float> roll_rad_{0};
   std::atomic<double> budget_ms_{0};
 
-  mutable std::mutex mutex_;  // of what follows to the next line
+  mutable std::mutex mutex_;              // of what follows to the next line
   std::shared_ptr<DensePose> densepose_;  // the pipeline's thread alone changes it, and runs it
   DensePoseQuality quality_{0, 0};
   std::optional<SurfaceGrid> surface_;
 
-  // Of the pipeline's thread.
+  // The pipeline's thread alone uses these.
   DensePoseQuality full_;
   std::optional<FrameBudget> budget_;
   double known_budget_ms_ = 0;
@@ -180,6 +179,6 @@ maq_status maq_densepose_model_get_surface(maq_model* model, maq_densepose_surfa
 }
 
 const maq_densepose_result* maq_pipeline_result_get_densepose(const maq_pipeline_result* result) {
-  return part_of<DensePoseOutput>(result, __func__,
-                                  [](DensePoseOutput& output) -> const maq_densepose_result* { return &output.handle; });
+  return part_of<DensePoseOutput>(
+      result, __func__, [](DensePoseOutput& output) -> const maq_densepose_result* { return &output.handle; });
 }

@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "api/boundary.h"
-#include "api/edges_handle.h"
+#include "api/edges/edges_handle.h"
 #include "edges/files/curve_files.h"
 #include "edges/measuring/snap.h"
 

@@ -2,7 +2,7 @@
 
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
-#include "api/densepose_handle.h"
+#include "api/densepose/densepose_handle.h"
 #include "api/frame_handle.h"
 #include "api/model_options.h"
 #include "core/worker_threads.h"

@@ -3,7 +3,7 @@
 
 #include "api/boundary.h"
 #include "api/camera_argument.h"
-#include "api/edges_handle.h"
+#include "api/edges/edges_handle.h"
 #include "core/clock.h"
 #include "core/worker_threads.h"
 #include "edges/curves/curve_extractor.h"

@@ -1,0 +1,61 @@
+#include "arguments/densepose_options.h"
+
+#include <CLI/CLI.hpp>
+#include <maquette/maquette.hpp>
+#include <stdexcept>
+
+#include "arguments/bundle_argument.h"
+
+void add_model_options(CLI::App& command, ModelOptions& options) {
+  add_network_options(command, options, "MAQ_BUNDLE");
+  command.add_option("--size", options.size, "Long side of the network's input in pixels; larger is finer and slower")
+      ->check(CLI::Range(32, 2048));
+  command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
+  command
+      .add_option("--max-proposals", options.max_proposals,
+                  "Maximum number of boxes for the box head; fewer are faster and may miss people in a crowd")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--key-frames", options.key_frames,
+                  "Detect people in every N-th frame of a stream, and propagate their boxes in between (default 1)")
+      ->check(CLI::Range(1, 1000));
+  command
+      .add_option("--min-person-height", options.min_person_height_px,
+                  "People less tall than this, in pixels, may be missed; large values are faster")
+      ->check(CLI::Range(0, 100000));
+  command
+      .add_option("--crops", options.crops,
+                  "Look again at people in crops of the frame, rotated upright: off (default), auto (who is small or "
+                  "leans), all. Finer and slower")
+      ->check(CLI::IsMember({"off", "auto", "all"}));
+  command.add_option("--crop-size", options.crop_px, "Side of these crops in pixels (default 192)")
+      ->check(CLI::Range(64, 512));
+  command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
+}
+
+std::string bundle_of(const ModelOptions& options) {
+  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
+  if (bundle.empty()) {
+    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
+  }
+  return bundle;
+}
+
+maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle) {
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.model.bundle_path = bundle.c_str();
+  config.model.threads = options.threads;
+  config.long_side_px = options.size;
+  config.score_threshold = options.threshold;
+  config.max_proposals = options.max_proposals;
+  config.key_frame_interval = options.key_frames;
+  config.min_person_height_px = options.min_person_height_px;
+  config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
+  config.model.spinning = options.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
+  config.person_crops = options.crops == "auto"  ? MAQ_DENSEPOSE_CROPS_AUTO
+                        : options.crops == "all" ? MAQ_DENSEPOSE_CROPS_ALL
+                                                 : MAQ_DENSEPOSE_CROPS_OFF;
+  config.person_crop_px = options.crop_px;
+  config.model.provider = provider_of(options);
+  return config;
+}

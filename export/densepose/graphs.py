@@ -96,7 +96,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
 
 
 def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:
-    """The transposed convolution of U and V: weight [2, parts, 4, 4, C], bias [2, parts] (docs/reference/formats.md)."""
+    """The transposed convolution of U and V: weight [2, parts, 4, 4, C], bias [2, parts]; docs/reference/formats.md."""
     values = torch.from_numpy(np.fromfile(path, "<f4"))
     biases = 2 * parts
     return values[:-biases].reshape(2, parts, 4, 4, -1), values[-biases:].reshape(2, parts)

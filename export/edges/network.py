@@ -42,8 +42,8 @@ class EdgeNetwork(nn.Module):
 
     Plain 3 x 3 convolutions, ReLU, skips by addition, residual blocks where `config.blocks` has some, the finest layers
     at half resolution, the best layout for int8 kernels (docs/research/scenes.md). Planes without a histogram:
-    distance / EPS_R (0 to 1 where it is right, not cut off), logarithm of its spread, logits of crease and boundary. With one: logits of the
-    bins, then those two. double: replaced where a graph is made.
+    distance / EPS_R (0 to 1 where it is right, not cut off), logarithm of its spread, logits of crease and boundary.
+    With one: logits of the bins, then those two. double: replaced where a graph is made.
     """
 
     double: Callable[[Tensor, Tensor], Tensor] = staticmethod(_doubled)

@@ -2,8 +2,8 @@
 
 The fp32 graphs are made anew from the weights in `export/weights`, run on the pictures in `tests/media`, and every
 integer tensor is compared with its float original. A tensor whose signal to noise ratio is not the one written in
-`docs/research/quantization.json` (by `python -m quantization.report`) is named: a scale that is too large rounds coarsely, one
-that is too small cuts off.
+`docs/research/quantization.json` (by `python -m quantization.report`) is named: a scale that is too large rounds
+coarsely, one that is too small cuts off.
 """
 
 from __future__ import annotations

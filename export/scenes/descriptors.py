@@ -3,7 +3,7 @@ at once and differentiable.
 
 The reference for the SDK's `DescriptorRegression` (sdk/src/scene/assembly/descriptor_regression.h). From K views,
 features y and basis values h: (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0, beta0 = mean y; the descriptor
-is y(h) = beta0 + h beta. What is kept are means and the scatter around them, not sums, so that the right side of a point seen
+is y(h) = beta0 + h beta. Means and the scatter around them are kept, not sums, so that the right side of a point seen
 once, or always from the same side, is exactly 0. The SDK keeps the scatter's Cholesky factor, which is more exact in
 float; here is float64.
 """

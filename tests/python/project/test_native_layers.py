@@ -26,8 +26,8 @@ SYSTEMS = (
     SCENE
     | CURVES
     | HEAD
-    | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/reconstruction", "head/bundle", "head/files",
-       "head/render", "prediction", "prediction/codes", "prediction/networks", "prediction/surprise",
+    | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/reconstruction", "head/bundle",
+       "head/files", "head/render", "prediction", "prediction/codes", "prediction/networks", "prediction/surprise",
        "prediction/transformer", "sources", "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {

@@ -1,4 +1,4 @@
-"""scripts/test.sh stops when its tools cannot be made, and runs failed tests once more; with stand-ins for its tools."""
+"""scripts/test.sh stops when its tools cannot be made, and runs failed tests once more; its tools are stand-ins."""
 
 import os
 import shutil

@@ -33,13 +33,20 @@ from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.heads.bundle import PRIOR, TEMPLATE, write_manifest
 from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, figures
-from export.heads.encoder_data import Backgrounds, Crop, batched, crop_of, read_heads
+from export.heads.encoder_data import (
+    Backgrounds,
+    Crop,
+    batched,
+    crop_of,
+    held_out_crops,
+    held_out_face_crops,
+    read_heads,
+)
 from export.heads.export_onnx import ENCODER
 from export.heads.field import bases_of, geometry
 from export.heads.head_shards import read_points
 from export.heads.prior import Prior, PriorError
 from export.heads.prior_file import FORMATS, HEAD, prior_bytes, prior_from_bytes, write_prior
-from export.heads.train_encoder import held_out_crops, held_out_face_crops
 from export.heads.train_prior import HeadTensors, fitted_codes
 from quantization.analysis.errors import sqnr_db
 from quantization.blocks import Workpiece, blocks

@@ -22,7 +22,7 @@ from export.bundle import BundleInfo, bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.prediction.bundle import write_manifest
 from export.prediction.motion_pictures import HORIZONS
-from export.prediction.parallel import times_ahead
+from export.prediction.pictures.convolutional import times_ahead
 from export.prediction.pictures.foreseen import read_foreseen
 from export.prediction.pictures.mended_graph import MENDED, export_mended
 from export.prediction.pictures.picture_error import psnr_db

@@ -25,13 +25,12 @@ from export.prediction.bundle import CODES, GRAPHS, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
-from export.prediction.graphs.expected_graph import EXPECTED
 from export.prediction.pictures.mended_graph import MENDED
 from export.prediction.pictures.picture_error import psnr_db
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
-from quantization.transformer import quantize_expected, quantize_transformer, transformer_cost
+from quantization.transformer import quantize_transformer, transformer_cost
 
 
 def frames_of(data: Path, sets: Sequence[str], split: str, count: int) -> np.ndarray:
@@ -121,10 +120,8 @@ def main() -> None:
     quality, measured = kept_pictures(options) if options.keep else quantized_pictures(options, settings)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    for name in (TRANSFORMER, f"{EXPECTED}.onnx", f"{MENDED}.onnx"):  # of an earlier bundle
+    for name in (TRANSFORMER, f"{MENDED}.onnx"):  # of an earlier bundle
         (options.out / name).unlink(missing_ok=True)
-    if (options.fp32 / f"{EXPECTED}.onnx").exists():
-        quantize_expected(options.fp32, options.out)
     if (options.fp32 / TRANSFORMER).exists():
         calibrating = read_codes(options.codes, "train")
         quantize_transformer(options.fp32, options.out, calibrating, settings.frames)

@@ -20,13 +20,11 @@ from export.prediction.bundle import CODES, TRANSFORMER, transformer_graphs
 from export.prediction.code_file import prior_of, read_code_file
 from export.prediction.codes import CodedClips
 from export.prediction.config import TransformerShape
-from export.prediction.graphs.expected_graph import EXPECTED
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import read_transformer_file, transformer_bytes
 from export.prediction.graphs.transformer_graphs import SLICES, head_name
 from export.prediction.train_transformer import examples, held_out_frames
 from quantization.graphs.fixed_scales import Ranges, fix_scales, scaled_inputs, show
-from quantization.graphs.stored_bytes import store_as_bytes
 
 
 def quantize_transformer(source: Path, target: Path, clips: CodedClips, count: int) -> None:
@@ -94,27 +92,6 @@ def runtime_of(folder: Path) -> tuple[GraphRuntime, TransformerShape]:
     tables = read_transformer_file(folder / TRANSFORMER)
     shape = TransformerShape(frames=tables.before, slices=len(tables.earlier), motion=tables.frames > tables.before)
     return GraphRuntime(folder, tables, prior_of(read_code_file(folder / CODES))), shape
-
-
-def quantize_expected(source: Path, target: Path) -> None:
-    """The same of the graph of the expected frame. Probabilities times rows stay float products: in bytes, all but the
-    largest of 512 would vanish."""
-    name = f"{EXPECTED}.onnx"
-    graph = onnx.load(source / name).graph
-    constants = {tensor.name: list(tensor.dims) for tensor in graph.initializer}
-    chances = {node.output[0] for node in graph.node if node.op_type == "Softmax"}
-    by_chance = [n for n in graph.node if n.op_type == "MatMul" and n.input[0] in chances and n.input[1] in constants]
-    rows = [n.input[0] for n in graph.node if n.op_type == "Gather" and len(constants.get(n.input[0], [])) == 2]
-    quantize_dynamic(
-        source / name, target / name, per_channel=True, reduce_range=True, weight_type=QuantType.QInt8,
-        op_types_to_quantize=["MatMul"], nodes_to_exclude=[node.name for node in by_chance],
-    )  # fmt: skip
-    model = onnx.load(target / name)
-    axes = {node.input[1]: len(constants[node.input[1]]) - 1 for node in by_chance}
-    store_as_bytes(model, [*axes.items(), *((row, 0) for row in dict.fromkeys(rows))])
-    onnx.checker.check_model(model, full_check=True)
-    onnx.save(model, target / name)
-    print(f"{EXPECTED}: {(source / name).stat().st_size / 1e6:.2f} -> {(target / name).stat().st_size / 1e6:.2f} MB")
 
 
 def bits_of_frames(folder: Path, clips: CodedClips, count: int) -> np.ndarray:

@@ -4,12 +4,12 @@
 #
 #     scripts/train-prediction-from-pack.sh prediction.pack OUT
 #
-# Collages of its photographs are made first. Then the autoencoder, beside it the convolutional network; then codes; then
-# both transformers and the network that mends what `auto` foresees, at once. Weights (half precision, but for the
-# autoencoder), logs and curves are copied to OUT.
+# It makes collages of the pack's photographs, then trains the autoencoder beside the convolutional network, writes codes,
+# and trains the transformer beside the network that refines the prediction of `auto`. It copies weights (half
+# precision, except the autoencoder's), logs and curves to OUT.
 #
 # Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the collages, the batches and
-# the validation (100), PROCESSES for motion and what is foreseen (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
+# the validation (100), PROCESSES for motion and the predictions of `auto` (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
 set -eu
 [ $# = 2 ] || { sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -37,7 +37,6 @@ for counts in "train 2500" "val 32"; do
     --processes "${PROCESSES:-5}"
 done
 sets="pushing shapes collages"
-autoencoder=.data/runs/prediction-autoencoder/weights.pt
 "$python" -m export.prediction.pictures.train_convolutional --sets $sets --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3 >convolutional.log 2>&1 &
 convolutional=$!
@@ -49,21 +48,17 @@ for split in train val; do
   "$python" -m export.prediction.pictures.foreseen --sets $sets --split $split --processes "${PROCESSES:-5}"
 done
 minutes=$(spare 0.95)
-"$python" -m export.prediction.train_parallel --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
-  --autoencoder "$autoencoder" --validate-frames "$(part 64)" --validate-minutes 3 >parallel.log 2>&1 &
-parallel=$!
 "$python" -m export.prediction.pictures.train_convolutional --sets $sets --foreseen .data/prediction/foreseen \
   --out .data/runs/prediction-mender --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
   >mender.log 2>&1 &
 mender=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3
-wait "$parallel" || echo "the parallel transformer failed" >&2
 wait "$convolutional" || echo "the convolutional network failed" >&2
 wait "$mender" || echo "the mender failed" >&2
-tail -n 3 convolutional.log mender.log parallel.log
-for name in transformer parallel convolutional mender; do keep "prediction-$name" "$name"; done
-cp convolutional.log mender.log parallel.log "$out/"
+tail -n 3 convolutional.log mender.log
+for name in transformer convolutional mender; do keep "prediction-$name" "$name"; done
+cp convolutional.log mender.log "$out/"
 "$python" - "$out" <<'HALF'
 import sys
 from pathlib import Path

@@ -15,7 +15,6 @@ from torch.nn import functional as F
 from export.densepose.config import NetworkConfig
 from export.densepose.data import MEAN, STD
 from export.densepose.network import BiFPN, ConvBn, InvertedResidual, MobileNetV2
-from export.training import save_atomically
 
 CROP_PX, CELL_PX = 192, 4
 CELLS = CROP_PX // CELL_PX
@@ -24,6 +23,7 @@ POINT, LOG_SIGMA, MATTE, NORMAL = slice(0, 3), 3, 4, slice(5, 8)
 WIDTH = 64
 CONTEXT_WIDTH, CONTEXT = 32, 128
 STRIDE = 32  # of the coarsest map
+UNKNOWN_MATTE = -1.0  # of a label
 
 
 class HeadEncoder(nn.Module):
@@ -168,10 +168,6 @@ def photo_figures(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor
         "photo_within_2_sigma": float((away < 2 * sigma)[on].float().mean()),
         "photo_matte_iou": float((head & mine).sum() / (head | mine).sum().clamp(min=1)),
     }
-
-
-def save_encoder(encoder: HeadEncoder, path: Path) -> None:
-    save_atomically({"state": encoder.state_dict()}, path)
 
 
 def load_encoder(path: Path) -> HeadEncoder:

@@ -1,4 +1,4 @@
-"""What the encoder is trained on: made heads, cropped and turned, in front of photographs, as cameras see them."""
+"""Crops of synthetic heads in front of photographs: calibration and validation data of the encoder's int8 graph."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-from torch.utils.data import IterableDataset
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX
 from export.heads.head_shards import (
@@ -25,6 +24,7 @@ from export.people.imaging import camera_faults
 MAX_BILINEAR_ZOOM = 1.25
 FACE_FRACTION = 0.5  # of the training crops
 MIN_FACE_FRACTION, STRAY_FRACTION = 0.01, 0.01
+VIEWS = 6  # of a held-out head
 
 
 @dataclass(frozen=True)
@@ -205,26 +205,22 @@ def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadP
     return [read_pictures(path) for path in paths]
 
 
-class CropStream(IterableDataset):
-    """Endless random batches of made heads: image float32 [B, 192, 192, 3], template, matte, normal."""
+def held_out_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
+    """The same crops of validation heads each time, VIEWS a head, with and without camera artefacts."""
+    rng = np.random.default_rng(1)
+    heads = read_heads(folder, "val")
+    return [crop_of(p, k, backgrounds, rng, augment=k % 2 == 1) for p in heads for k in range(VIEWS)]
 
-    def __init__(self, heads: list[HeadPictures], backgrounds: Backgrounds, batch: int, seed: int) -> None:
-        self.heads, self.backgrounds, self.batch, self.seed = heads, backgrounds, batch, seed
 
-    def __iter__(self):
-        info = torch.utils.data.get_worker_info()
-        rng = np.random.default_rng([self.seed, info.id if info else 0])
-        cv2.setNumThreads(1)
-        while True:
-            yield self.random_batch(rng, self.batch)
-
-    def random_batch(self, rng: np.random.Generator, count: int) -> tuple[torch.Tensor, ...]:
-        crops = []
-        for number in rng.integers(len(self.heads), size=count):
-            pictures = self.heads[number]
-            k, of_face = int(rng.integers(len(pictures.rgb))), rng.random() < FACE_FRACTION
-            crops.append(crop_of(pictures, k, self.backgrounds, rng, of_face=of_face))
-        return batched(crops)
+def held_out_face_crops(folder: Path, backgrounds: Backgrounds) -> list[Crop]:
+    """The same crops of the faces of validation heads each time, without augmentation."""
+    rng = np.random.default_rng(1)
+    return [
+        crop_of(p, k, backgrounds, rng, augment=False, of_face=True)
+        for p in read_heads(folder, "val")
+        for k in range(VIEWS)
+        if face_box_of(p, k) is not None
+    ]
 
 
 def batched(crops: list[Crop]) -> tuple[torch.Tensor, ...]:

@@ -62,7 +62,7 @@ def main() -> int:
         help="close: 320 x 256, mostly upright; wide: 640 x 512, small, tilted, crowded people; usual: 640 x 512, as "
              "photographs show them; animals: without people (default %(default)s)",
     )  # fmt: skip
-    parser.add_argument("--bare", action="store_true", help="nobody wears clothes (export.evaluation.ablation)")
+    parser.add_argument("--bare", action="store_true", help="render people without clothes")
     options = parser.parse_args()
     out = options.out / options.split
     out.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from export.bundle import LICENCE, BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
-from export.prediction.graphs.expected_graph import EXPECTED
 from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
 from export.prediction.graphs.transformer_graphs import CONTEXT, SLICES, head_name
 from export.prediction.motion_pictures import HORIZONS
@@ -16,7 +15,6 @@ from export.prediction.pictures.mended_graph import MENDED
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
-FRAMES = 3  # before the one that is expected, which the parallel transformer sees; one made from motion may follow
 TRAINED_FPS = (10, 30)  # of the clips that transformers were trained on
 CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
@@ -50,9 +48,8 @@ def frame_side(graphs: dict[str, Signature], slices: int, width: int, side: int)
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:
-    """Describes the graphs, `codes.maqc` and where they are there `transformer.maqr`, `expected.onnx` and `mended.onnx`
-    that lie in `folder`, and writes `manifest.json`, which it returns. Raises ValueError where they do not belong
-    together."""
+    """Writes `manifest.json` for the graphs, `codes.maqc` and the optional `transformer.maqr` and `mended.onnx` in
+    `folder`, and returns it. Raises ValueError where these files do not belong together."""
     codes = read_code_file(folder / CODES)
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     slices, _, width = codes.entries.shape
@@ -68,10 +65,6 @@ def write_manifest(folder: Path, info: BundleInfo) -> dict:
         graphs[MENDED] = signature_of(folder / f"{MENDED}.onnx")
         before = graphs[MENDED]["inputs"]["pictures"][3] // 3 - 1
         keys[MENDED] = {"before": before, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
-    if (folder / f"{EXPECTED}.onnx").exists():
-        graphs[EXPECTED] = signature_of(folder / f"{EXPECTED}.onnx")
-        seen = graphs[EXPECTED]["inputs"]["before"][1] // slices
-        keys[EXPECTED] = {"before": FRAMES, "frames": seen, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
     return write_bundle_manifest(folder, "prediction", info, graphs, files=files, task_keys=keys)
 
 

@@ -28,15 +28,12 @@ from export.prediction.code_file import code_bytes
 from export.prediction.codes import read_codes
 from export.prediction.config import CODE_SIDE
 from export.prediction.export_transformer import export_transformer
-from export.prediction.graphs.expected_graph import EXPECTED, export_expected
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.parallel import ParallelTransformer
 from export.prediction.pictures.convolutional import ConvolutionalNet
 from export.prediction.pictures.mended_graph import MENDED, export_mended
 from export.prediction.pictures.train_convolutional import load_convolutional
 from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
-from export.prediction.train_parallel import load_parallel
 from export.prediction.train_transformer import load_transformer
 from export.prediction.transformer import LatentTransformer
 
@@ -98,19 +95,16 @@ def export_bundle(
     folder: Path,
     info: BundleInfo,
     transformer: LatentTransformer | None = None,
-    parallel: ParallelTransformer | None = None,
     mender: ConvolutionalNet | None = None,
 ) -> dict[str, float]:
     """The whole bundle; returns how far each part is from torch. Raises ValueError where that is too far. table: the
     transformer's own, where there is one."""
     folder.mkdir(parents=True, exist_ok=True)
     differences = export_graphs(net, folder)
-    for name in (TRANSFORMER, f"{EXPECTED}.onnx", f"{MENDED}.onnx"):  # of an earlier export
+    for name in (TRANSFORMER, f"{MENDED}.onnx"):  # of an earlier export
         (folder / name).unlink(missing_ok=True)
     if mender is not None:
         differences[MENDED] = export_mended(mender, folder)
-    if parallel is not None:
-        differences[EXPECTED] = export_expected(parallel, net.codebook.entries, folder)
     if transformer is not None:
         differences["transformer"] = export_transformer(transformer, folder)
         write_whole(transformer_bytes(TransformerTables.of(transformer)), folder / TRANSFORMER)
@@ -127,7 +121,6 @@ def main() -> None:
         "--codes", type=Path, default=Path(".data/prediction"), help="folder of export.prediction.codes"
     )
     parser.add_argument("--transformer", type=Path, help="its weights, whose table is taken; default: without one")
-    parser.add_argument("--parallel", type=Path, help="weights of the parallel transformer; default: without one")
     parser.add_argument("--mender", type=Path, help="weights of the network that mends; default: without one")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
@@ -141,9 +134,8 @@ def main() -> None:
     else:
         table = CodeTable.of_stacked(transformer.table)
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=TRAINING_DATA)
-    parallel = load_parallel(options.parallel) if options.parallel else None
     mender = load_convolutional(options.mender) if options.mender else None
-    for name, difference in export_bundle(net, table, options.out, info, transformer, parallel, mender).items():
+    for name, difference in export_bundle(net, table, options.out, info, transformer, mender).items():
         print(f"{name}: within {difference:.1e} of torch")
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
 

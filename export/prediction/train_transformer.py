@@ -25,7 +25,6 @@ from export.prediction import run
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.codes import CodedClips, read_codes
 from export.prediction.config import TRANSFORMERS, TransformerShape
-from export.prediction.motion_pictures import HORIZONS
 from export.prediction.sampling import drawn_codes
 from export.prediction.table import CodeTable, bits_by_frequency, bits_by_table
 from export.prediction.train_autoencoder import load_autoencoder
@@ -45,20 +44,16 @@ class Examples:
     fps: Tensor
 
 
-def examples(
-    clips: CodedClips, clip: Tensor, t: Tensor, shape: TransformerShape, horizon: Tensor | None = None
-) -> Examples:
-    """Frames number t [B] of clips number `clip` [B], with the frames seen up to HORIZONS[horizon] before them
-    (default: one); UNSEEN before a clip's first."""
-    horizon = torch.zeros_like(t) if horizon is None else horizon
-    now = t - torch.tensor(HORIZONS, device=t.device)[horizon]
+def examples(clips: CodedClips, clip: Tensor, t: Tensor, shape: TransformerShape) -> Examples:
+    """Frames number t [B] of clips number `clip` [B], with the frames before them; UNSEEN before a clip's first."""
+    now = t - 1
     at = now[:, None] + torch.arange(1 - shape.frames, 1, device=t.device)
     before = torch.where((at < 0)[..., None, None, None], UNSEEN, clips.codes[clip[:, None], at.clamp(min=0)].long())
     if shape.motion:
         by_motion = torch.full_like(before[:, :1], UNSEEN)
         if clips.motion is not None:
             known = (now >= 0)[:, None, None, None]
-            by_motion[:, 0] = torch.where(known, clips.motion[clip, now.clamp(min=0), horizon].long(), UNSEEN)
+            by_motion[:, 0] = torch.where(known, clips.motion[clip, now.clamp(min=0), 0].long(), UNSEEN)
         before = torch.cat([before, by_motion], 1)
     return Examples(before, clips.codes[clip, t].long(), clips.fps[clip])
 

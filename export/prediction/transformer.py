@@ -21,12 +21,9 @@ UNSEEN = -1  # code of a frame before the stream's first
 
 
 class ContextNetwork(nn.Module):
-    """Codes of the frames before, and of the one that motion predicts -> features of each place of the frame to come.
+    """Codes of the frames before, and of the one that motion predicts -> features of each place of the frame to come."""
 
-    times: how many numbers about time it is told.
-    """
-
-    def __init__(self, shape: TransformerShape, times: int = 1) -> None:
+    def __init__(self, shape: TransformerShape) -> None:
         super().__init__()
         self.shape = shape
         # A convolution in time of one-hots is a sum of rows; the row after the last stands for unseen codes and is 0.
@@ -34,13 +31,13 @@ class ContextNetwork(nn.Module):
         self.rows = nn.Embedding(rows + 1, shape.embedding, padding_idx=rows)
         nn.init.normal_(self.rows.weight, std=(shape.seen * shape.slices) ** -0.5)
         self.rows.weight.data[-1] = 0
-        self.time_step = nn.Linear(times, shape.embedding)
+        self.time_step = nn.Linear(1, shape.embedding)
         self.widen = nn.Linear(shape.embedding, shape.width)
         self.layers = nn.Sequential(*(AttentionLayer(shape, masked=False) for _ in range(shape.layers)))
 
     def forward(self, before: Tensor, times: Tensor) -> Tensor:
-        """before int64 [B, seen, slices, 16, 16], oldest first, UNSEEN where there was none; times [B, times], as
-        log2 of ten times the seconds -> [B, 256, width]."""
+        """before int64 [B, seen, slices, 16, 16], oldest first, UNSEEN where there was none; times [B, 1] of
+        `times_of` -> [B, 256, width]."""
         shape = self.shape
         codes = before.flatten(3).flatten(1, 2).transpose(1, 2)  # [B, 256, seen * slices]
         first = torch.arange(codes.shape[-1], device=codes.device) * shape.entries

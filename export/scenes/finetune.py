@@ -1,27 +1,22 @@
-"""Fine-tunes one scene to its photos: the descriptors of its points and, if wanted, the refiner.
+"""Fine-tunes the descriptors of one scene to its photos.
 
     maquette scene build PLACE --bundle BUNDLE --out place.maqs
     python -m export.scenes.finetune PLACE --scene place.maqs --networks BUNDLE --weights RUN/weights.pt \\
         --seconds 60 --out tuned.maqs
 
-`--weights` are those that the bundle was exported from (export.scenes.train): int8 graphs have no gradients. The scene
-written has the same points in the same blocks, and is shown with the same networks. With `--refiner` those are tuned
-too: a bundle of the same precision is written beside the scene, as `tuned-networks`, and the scene wants that one.
-With `--save-at 10 60 600`, `--out` is a folder, and gets `10s.maqs` and so on of one run; `python -m benchmarks
---fine-tuned` reads folders of such folders.
+`--weights` names the weights that the bundle was exported from (export.scenes.train), because int8 graphs have no
+gradients. The written scene has the same points in the same blocks, and works with the same bundle.
+With `--save-at 10 60 600`, `--out` is a folder, and one run writes `10s.maqs`, `60s.maqs` and `600s.maqs` into it;
+`python -m benchmarks --fine-tuned` reads a folder of such folders.
 
-It learns from the photos that the scene was built from, all of them: one held out now would have shaped the scene
-already. PSNR on held-out photos is printed before and after. Seconds are wall-clock time of
-learning; what is found once, saving and measuring come on top and are said apart.
+The training uses all photos that the scene was built from. It prints the PSNR of held-out photos before and after.
+`--seconds` counts training only: preparation, saving and measuring take additional time.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -36,22 +31,18 @@ from export.densepose.graphs import session
 from export.point_cloud import PointCloudError
 from export.scenes.bundle import BASIS, identity
 from export.scenes.captures import Capture, CaptureError, read_capture
-from export.scenes.export_onnx import export_refiner
 from export.scenes.fitting import View
 from export.scenes.geometry.cameras import upright, warped
 from export.scenes.losses import LossWeights
 from export.scenes.networks.extractor import STRIDE
 from export.scenes.networks.feature_scale import factors_between, scaled
-from export.scenes.networks.light_refiner import LightRefiner, space_to_depth
 from export.scenes.networks.system import Networks, load_networks
 from export.scenes.perceptual import load_perceptual
 from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import SceneFile, SceneFileError, read_scene_file, write_scene_file
-from export.scenes.tuning import Rates, Shown, TunedScene, Tuning
+from export.scenes.tuning import Rates, TunedScene, Tuning
 
-REFINER_RATE = 1e-4
-MIN_FRACTION = 0.1  # of the learning rates, where a save is due
-MAX_VIEWS = 8  # of the scene that set the ranges of an int8 refiner
+MIN_FRACTION = 0.1  # of the learning rates, at the time of a save
 
 
 def networks_of_bundle(weights: Path, bundle: Path, view: View, up: tuple[float, float, float]) -> Networks:
@@ -95,31 +86,6 @@ def measured(scene: TunedScene, views: Iterable[View]) -> float:
     return float(np.mean([psnr_db(scene.rendered(view.camera), view.image) for view in views]))
 
 
-def write_tuned_networks(scene: TunedScene, views: list[Shown], shipped: Path, folder: Path) -> str:
-    """A bundle of the precision of the one in `shipped`, calibrated on views of the scene; returns its identity."""
-    with tempfile.TemporaryDirectory() as work:
-        refiner = Path(work) / "refiner.onnx"
-        export_refiner(scene.networks.refiner.cpu(), refiner)
-        scene.networks.refiner.to(scene.positions.device)
-        for k, view in enumerate(views[:: -(-len(views) // MAX_VIEWS)]):
-            np.savez(Path(work) / f"{k}.npz", **_refiner_inputs(scene, view))
-        # A program of its own: calibration builds on this package, not the other way round.
-        command = [sys.executable, "-m", "quantization.tuned_bundle", "--refiner", refiner, "--samples", work]
-        subprocess.run([*command, "--shipped", shipped, "--out", folder], check=True)
-    return identity(read_manifest(folder))
-
-
-@torch.no_grad()
-def _refiner_inputs(scene: TunedScene, view: Shown) -> dict[str, np.ndarray]:
-    """What the refiner's graph is given for one view."""
-    rasters, refiner = scene.rasters(view), scene.networks.refiner
-    if isinstance(refiner, LightRefiner):
-        rasters = rasters[: refiner.config.levels]
-        if refiner.config.space_to_depth:
-            rasters = [space_to_depth(rasters[0]), *rasters[1:]]
-    return {f"raster{k}": x.permute(0, 2, 3, 1).contiguous().cpu().numpy() for k, x in enumerate(rasters)}
-
-
 class Files:
     """Where a scene goes after so many seconds, and its networks beside it."""
 
@@ -131,10 +97,6 @@ class Files:
     def scene(self, seconds: float) -> Path:
         return self._folder / f"{seconds:g}s.maqs" if self._folder else self._file
 
-    def networks(self, seconds: float) -> Path:
-        scene = self.scene(seconds)
-        return scene.with_name(f"{scene.stem}-networks")
-
 
 def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argparse.Namespace) -> None:
     """Learns, saves and prints, as the head of this file says."""
@@ -142,9 +104,8 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     model, files = TunedScene(scene, networks, device), Files(options)
     perceptual = load_perceptual(options.pretrained).to(device) if options.pretrained else None
-    rates = Rates(refiner=REFINER_RATE if options.refiner else 0.0)
     views = [capture.view(k, options.long_side) for k in capture.sources()]
-    tuning = Tuning(model, views, rates, LossWeights(), perceptual)
+    tuning = Tuning(model, views, Rates(), LossWeights(), perceptual)
     print(f"{len(model.mean)} points, {len(model.slope)} of which vary, {len(views)} photos")
     print(f"getting ready took {time.monotonic() - begin_s:.1f} s")
 
@@ -165,9 +126,6 @@ def tune(scene: SceneFile, networks: Networks, capture: Capture, options: argpar
                 bar.update(min(round(spent_s), round(due_s)) - bar.n)
         begin_s = time.monotonic()
         tuned = scene.with_descriptors(*model.descriptors())
-        if options.refiner:
-            sha256 = write_tuned_networks(model, tuning.shown, options.networks, files.networks(due_s))
-            tuned = tuned.with_networks(sha256)
         write_scene_file(tuned, files.scene(due_s))
         print(f"{files.scene(due_s)}: {spent_s:.1f} s, {steps} steps; saved in {time.monotonic() - begin_s:.1f} s")
         say(f"after {due_s:g} s")
@@ -182,7 +140,6 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="the tuned scene; with --save-at a folder")
     parser.add_argument("--seconds", type=float, default=60, help="how long to learn")
     parser.add_argument("--save-at", type=float, nargs="+", metavar="SECONDS", help="save several times; no --seconds")
-    parser.add_argument("--refiner", action="store_true", help="tune the refiner too: another bundle for this scene")
     parser.add_argument(
         "--pretrained", type=Path, help="compare pictures by these features too (export.teachers.backbone)"
     )

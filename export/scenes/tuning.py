@@ -31,12 +31,11 @@ BETAS = 0.9, 0.99  # a point that is met for the first time then moves by the ra
 
 @dataclass(frozen=True)
 class Rates:
-    """Learning rates of Adam. mean, slope: of descriptors, whose features have the range of colours, 0..1. refiner: of
-    its weights, 1e-4 in the paper; 0: they stay."""
+    """Learning rates of Adam for the constant (`mean`) and linear (`slope`) terms of descriptors, whose features have the
+    range of colours, 0..1."""
 
     mean: float = 1e-2
     slope: float = 3e-4
-    refiner: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,16 +138,13 @@ class Tuning:
         if not views:
             raise ValueError("there is no photo to learn from")
         self.scene, self.weights, self.perceptual = scene, weights, perceptual
-        self._rates, self._random = rates, np.random.default_rng(seed)
+        self._random = np.random.default_rng(seed)
         self._queue: list[int] = []
         device = scene.positions.device
         self.shown = [scene.shown(view.camera) for view in views]
         self._photos = [torch.from_numpy(view.image).permute(2, 0, 1)[None].to(device) for view in views]
         groups = [{"params": [scene.mean], "whole": rates.mean}, {"params": [scene.slope], "whole": rates.slope}]
-        self._optimisers = [torch.optim.SparseAdam([g for g in groups if g["params"][0].numel()], 1e-3, BETAS)]
-        if rates.refiner:
-            refiner = scene.networks.refiner.requires_grad_(True)
-            self._optimisers.append(torch.optim.Adam([{"params": list(refiner.parameters()), "whole": rates.refiner}]))
+        self._optimiser = torch.optim.SparseAdam([g for g in groups if g["params"][0].numel()], 1e-3, BETAS)
 
     def step(self, rate_fraction: float = 1.0) -> float:
         """Renders one photo and goes a step; the loss before it. rate_fraction: of the learning rates."""
@@ -160,12 +156,10 @@ class Tuning:
             self.scene.picture(self.shown[k]), photo, torch.ones_like(photo[:, :1]), self.weights, self.perceptual
         )
         loss = sum(terms.values())
-        for optimiser in self._optimisers:
-            optimiser.zero_grad(set_to_none=True)
-            for group in optimiser.param_groups:
-                group["lr"] = group["whole"] * rate_fraction
+        self._optimiser.zero_grad(set_to_none=True)
+        for group in self._optimiser.param_groups:
+            group["lr"] = group["whole"] * rate_fraction
         loss.backward()
         if torch.isfinite(loss):
-            for optimiser in self._optimisers:
-                optimiser.step()
+            self._optimiser.step()
         return loss.item()

@@ -1,5 +1,4 @@
-"""Training crops of a pool of pictures and of real faces, a whole batch at once: `encoder_data` and `photos.crops` in
-torch.
+"""Training crops of a pool of images and of real faces, a whole batch at once; `encoder_data` cuts single crops.
 
 Random numbers that belong to a crop are drawn on the CPU; noise is drawn where the crops are.
 """
@@ -13,12 +12,11 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from export.heads.encoder import CELL_PX, CELLS, CROP_PX
+from export.heads.encoder import CELL_PX, CELLS, CROP_PX, UNKNOWN_MATTE
 from export.heads.encoder_data import FACE_FRACTION, MAX_BILINEAR_ZOOM
 from export.heads.gpu.faults import as_cameras_see
 from export.heads.gpu.pictures import Pool
 from export.heads.head_shards import FACE_SIDES, LABEL_STEP, POINT_SCALE
-from export.heads.photos.crops import UNKNOWN_MATTE
 
 CHUNK = 64  # crops cut at once: pictures are copied as floats
 _GREY = 127.0
@@ -155,7 +153,7 @@ class Cropper:
 
     @torch.no_grad()
     def made(self, pool: Pool, filled: int, count: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Crops of the first `filled` pictures of a pool, as of `CropStream`: image float32 [B, 192, 192, 3], template
+        """Crops of the first `filled` pictures of a pool: image float32 [B, 192, 192, 3], template
         [B, 48, 48, 3] dm, matte [B, 48, 48], normal [B, 48, 48, 3]."""
         random = self._random
         number = torch.randint(filled, (count,), generator=random).to(self.device)
@@ -197,7 +195,7 @@ class Cropper:
 
     @torch.no_grad()
     def real(self, faces: RealFaces, count: int) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """Crops of real faces, as of `photos.crops.batched_photos`."""
+        """Crops of real faces: image, pixel, template, weight and matte as in `photos.judge.PhotoCrop`."""
         random = self._random
         number = torch.randint(len(faces.rgb), (count,), generator=random)
         of_face = torch.rand(count, generator=random) < FACE_FRACTION

@@ -31,6 +31,7 @@ from export.heads.encoder import (
     losses,
     photo_figures,
     photo_losses,
+    start_from_detector,
     start_from_encoder,
 )
 from export.heads.gpu.crops import Backgrounds, Cropper
@@ -137,8 +138,11 @@ def train(options: argparse.Namespace) -> None:
     cropper = Cropper(Backgrounds(backgrounds.to(device)), kernels, device, options.seed)
     faces = faces.to(device)
     encoder = HeadEncoder()
+    if options.detector:
+        start_from_detector(encoder, options.detector)
+    else:
+        start_from_encoder(encoder, options.start)
     encoder.backbone.freeze()
-    start_from_encoder(encoder, options.start)
     encoder.to(device, memory_format=torch.channels_last).train()
     mean = Ema(encoder, 0.998)
     trained = [p for p in encoder.parameters() if p.requires_grad]
@@ -213,7 +217,14 @@ def train(options: argparse.Namespace) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pack", type=Path)
-    parser.add_argument("--start", type=Path, default=Path("export/weights/heads-encoder.pt"))
+    parser.add_argument(
+        "--start", type=Path, default=Path("export/weights/heads-encoder.pt"), help="encoder to begin with"
+    )
+    parser.add_argument(
+        "--detector",
+        type=Path,
+        help="begin with trunk and neck of these weights (export/weights/densepose-b.pt) instead",
+    )
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder-gpu"))
     parser.add_argument("--seconds", type=float, default=520, help="from start to end, all told")
     parser.add_argument("--until", type=float, metavar="TIME", help="of the end, Unix time, instead of --seconds")

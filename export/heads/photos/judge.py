@@ -10,24 +10,73 @@ where the encoder does, ten times as long in the millimetres of the template (x 
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
 
-from export.heads.encoder import CROP_PX, MATTE, POINT, at_pixels, load_encoder, photo_figures, run_encoder
-from export.heads.photos.crops import PhotoCrop, batched_photos, crop_photo
-from export.heads.photos.faces import SPLITS, read_photos
+from export.heads.encoder import (
+    CELL_PX,
+    CELLS,
+    CROP_PX,
+    MATTE,
+    POINT,
+    UNKNOWN_MATTE,
+    at_pixels,
+    load_encoder,
+    photo_figures,
+    run_encoder,
+)
+from export.heads.encoder_data import placing
+from export.heads.photos.faces import HEAD, NOTHING, SPLITS, UNKNOWN, PhotoFaces, read_photos
 
+_GREY = 127
 _ZOOM = 2
 _DRAWN_PX = 100.0  # a dm of error
 
 
+@dataclass(frozen=True)
+class PhotoCrop:
+    """image uint8 RGB [192, 192, 3]; pixel float32 [P, 2] of the crop, where `template` float32 [P, 3] (dm) is seen;
+    weight float32 [P]; matte float32 [48, 48], -1 where unknown."""
+
+    image: np.ndarray
+    pixel: np.ndarray
+    template: np.ndarray
+    weight: np.ndarray
+    matte: np.ndarray
+
+
+def crop_photo(faces: PhotoFaces, k: int) -> PhotoCrop:
+    """A crop of face k and its head, upright in the middle."""
+    place = placing(np.random.default_rng(0), False, faces.rgb.shape[1])
+    nearest = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    matte = cv2.warpAffine(faces.matte[k], place.to_picture, (CROP_PX, CROP_PX), flags=nearest, borderValue=UNKNOWN)
+    pixel = (faces.pixel[k] - place.to_picture[:, 2]) @ np.linalg.inv(place.linear).T
+    inside = ((pixel >= 0) & (pixel <= CROP_PX - 1)).all(1)
+
+    def cells(values: np.ndarray) -> np.ndarray:
+        return values.astype(np.float32).reshape(CELLS, CELL_PX, CELLS, CELL_PX).mean((1, 3))
+
+    known = cells((matte == HEAD) | (matte == NOTHING)) == 1
+    return PhotoCrop(
+        np.clip(place.cut(faces.rgb[k], cv2.BORDER_CONSTANT, (_GREY,) * 3), 0, 255).astype(np.uint8),
+        pixel.astype(np.float32), faces.template.copy(), (faces.weight[k] * inside).astype(np.float32),
+        np.where(known, cells(matte == HEAD), np.float32(UNKNOWN_MATTE)).astype(np.float32),
+    )  # fmt: skip
+
+
+def batched_photos(crops: list[PhotoCrop]) -> tuple[torch.Tensor, ...]:
+    """image float32 [B, 192, 192, 3], pixel [B, P, 2], template [B, P, 3], weight [B, P], matte [B, 48, 48]."""
+    columns = zip(*((c.image.astype(np.float32), c.pixel, c.template, c.weight, c.matte) for c in crops), strict=True)
+    return tuple(torch.from_numpy(np.stack(column)) for column in columns)
+
+
 def faces_of(folder: Path, split: str) -> list[PhotoCrop]:
-    """Every face of the split, upright in the middle of its crop."""
-    rng = np.random.default_rng(1)
-    return [crop_photo(f, k, None, rng, augment=False) for f in read_photos(folder, split) for k in range(len(f.rgb))]
+    """Every face of the split."""
+    return [crop_photo(f, k) for f in read_photos(folder, split) for k in range(len(f.rgb))]
 
 
 def coloured(points: np.ndarray) -> np.ndarray:

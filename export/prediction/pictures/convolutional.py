@@ -14,6 +14,11 @@ from torch.nn import functional as F
 from export.prediction.autoencoder import scaled
 
 
+def times_ahead(fps: Tensor, frames: Tensor) -> Tensor:
+    """[B], [B] -> [B, 2]: log2 of ten times the seconds from frame to frame, and to the predicted frame."""
+    return torch.log2(torch.stack([10 / fps, 10 * frames / fps], 1))
+
+
 @dataclass(frozen=True)
 class ConvolutionalShape:
     """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks;

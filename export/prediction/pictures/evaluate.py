@@ -1,12 +1,10 @@
-"""How well the networks foresee pictures of held-out clips, by frames ahead, beside the last frame, motion alone, and
-what the SDK foresees from both (`auto`).
+"""Compares the networks with the last frame, with motion, and with the SDK's `auto` on held-out clips, by frames ahead.
 
     python -m export.prediction.pictures.evaluate --sets pushing --split val
 
-PSNR in dB at 64 x 64, mean of frames spread over all clips. A network of codes gives its expected picture by the
-decoder (`plain`), or adds to a picture what that differs from what the decoder makes of the picture's own codes
-(`over last`, `over motion`). `mender` mends what `auto` foresees. `best` is the better of the last frame and motion;
-the networks are to beat it.
+Prints PSNR in dB at 64 x 64 pixels, the mean over frames spread over all clips. `convolutional` predicts from frames
+alone, `mender` refines the prediction of `auto`. `best` is the better one of the last frame and motion; a useful network
+is above it.
 """
 
 from __future__ import annotations
@@ -20,41 +18,29 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
-from export.prediction.autoencoder import Autoencoder
 from export.prediction.data import Clips, read_clips
 from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
-from export.prediction.parallel import ParallelTransformer, times_ahead
-from export.prediction.pictures.convolutional import ConvolutionalNet
+from export.prediction.pictures.convolutional import ConvolutionalNet, times_ahead
 from export.prediction.pictures.foreseen import foreseen
 from export.prediction.pictures.picture_error import psnr_db
 from export.prediction.pictures.train_convolutional import load_convolutional
-from export.prediction.train_autoencoder import load_autoencoder
-from export.prediction.train_parallel import expected_picture, load_parallel
 
 Rows = dict[str, dict[int, list[float]]]  # PSNR of each frame by method and frames ahead
 
 
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """None: not there, and left out."""
+    """A network that is None is left out."""
 
-    autoencoder: Autoencoder
-    parallel: ParallelTransformer | None
     convolutional: ConvolutionalNet | None
     mender: ConvolutionalNet | None
-
-
-def over(base: Tensor, made: Tensor, autoencoder: Autoencoder) -> Tensor:
-    """base + (made - what the decoder makes of the codes of base); float32 [B, 64, 64, 3]."""
-    own = autoencoder.decode(autoencoder.encode(base.round().to(torch.uint8)))
-    return base + made - own
 
 
 @torch.no_grad()
 def pictures_of(
     networks: Networks, frames: Tensor, by_motion: Tensor, by_auto: Tensor, fps: float, now: int, h: int
 ) -> dict[str, Tensor]:
-    """What each method shows HORIZONS[h] frames after frame `now` of a clip uint8 [T, 64, 64, 3]."""
+    """Predictions of each method HORIZONS[h] frames after frame `now` of a clip uint8 [T, 64, 64, 3]."""
     last, moved = frames[now][None].float(), by_motion[now, h][None].float()
     found = {"last": last, "motion": moved, "auto": by_auto[now, h][None].float()}
     times = times_ahead(torch.tensor([fps]), torch.tensor([float(HORIZONS[h])]))
@@ -65,16 +51,6 @@ def pictures_of(
                 *([by_auto[now, h][None]] if net.shape.motion else []),
             ]
             found[name] = net.predicted(torch.cat(shown)[None], times)
-    if networks.parallel is not None:
-        shape = networks.parallel.shape
-        shown = [frames[now + 1 - shape.frames : now + 1]]
-        if shape.motion:
-            shown.append(by_motion[now, h][None])
-        before = networks.autoencoder.encode(torch.cat(shown))[None]
-        made = expected_picture(networks.parallel, networks.autoencoder, before, times)
-        found["parallel, plain"] = made
-        found["parallel, over last"] = over(last, made, networks.autoencoder)
-        found["parallel, over motion"] = over(moved, made, networks.autoencoder)
     return found
 
 
@@ -112,13 +88,8 @@ def main() -> None:
         path = options.runs / f"prediction-{name}" / "weights.pt"
         return path if path.exists() else None
 
-    autoencoder, parallel = there("autoencoder"), there("parallel")
-    if autoencoder is None:
-        parser.error(f"{options.runs}/prediction-autoencoder/weights.pt is not there: train it first")
     networks = Networks(
-        load_autoencoder(autoencoder),
-        load_parallel(parallel) if parallel else None,
-        *(load_convolutional(path) if (path := there(name)) else None for name in ("convolutional", "mender")),
+        *(load_convolutional(path) if (path := there(name)) else None for name in ("convolutional", "mender"))
     )
     rows = measured(networks, read_clips(options.data, options.sets, options.split), options.stride)
     print("| dB | " + " | ".join(map(str, HORIZONS)) + " |")

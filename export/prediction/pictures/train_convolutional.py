@@ -20,8 +20,7 @@ from torch import Tensor
 from export.prediction import run
 from export.prediction.data import Clips, read_clips
 from export.prediction.motion_pictures import HORIZONS
-from export.prediction.parallel import times_ahead
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
 from export.prediction.pictures.foreseen import read_foreseen
 from export.prediction.pictures.picture_error import psnr_db
 

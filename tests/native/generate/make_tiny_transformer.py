@@ -4,9 +4,8 @@ says of codes.
 `bundle`, and `rows_in_bytes.maqr`: its rows as bytes. `foreseen.f32`: little-endian [5][256][2], bits of each code of
 frames 1 to 5 of data/tiny_prediction given those before them, at 10 frames a second. `stream.f32`: [5][256], bits of a
 code as surprise has them from these, mean of the place. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
-likeliest given those before it. `expected.f32`: [16][16][16], what the decoder is given of the frame that is expected
-0.4 s after frame 2, given frames 0 to 2, and as what motion foresees frame 3; `mended.f32`: [64][64][3], that as the
-network without codes has it.
+likeliest given those before it. `mended.f32`: [64][64][3], the refined prediction 0.4 s after frame 2 from frames 0
+to 2 and frame 3 as the extrapolated frame.
 
     python -m tests.native.generate.make_tiny_transformer
 """
@@ -14,7 +13,6 @@ network without codes has it.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +25,7 @@ from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.parallel import ParallelTransformer, times_ahead
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.transformer import UNSEEN, LatentTransformer
 from tests.native.generate.make_tiny_prediction import tiny
@@ -54,15 +51,6 @@ def main() -> None:
             parameter.add_(0.15 * torch.randn_like(parameter))
         net.context.rows.weight[-1] = 0
         net.table.copy_(table.stacked())
-    parallel = ParallelTransformer(replace(SHAPE, motion=True)).eval()
-    with torch.no_grad():
-        for parameter in parallel.parameters():
-            parameter.add_(0.15 * torch.randn_like(parameter))
-        parallel.context.rows.weight[-1] = 0
-        before = codes[None, :4]
-        chances = parallel.expected(before, times_ahead(torch.tensor([FPS]), torch.tensor([4.0])))
-    entries = autoencoder.codebook.entries
-    mean = torch.cat([likely @ own for likely, own in zip(chances, entries, strict=True)], -1)
     bundle = FOLDER / "bundle"
     mender = ConvolutionalNet(ConvolutionalShape(widths=(4, 8, 8), blocks=1, kernel=3, motion=True)).eval()
     with torch.no_grad():
@@ -70,9 +58,8 @@ def main() -> None:
             parameter.add_(0.05 * torch.randn_like(parameter))
         times = times_ahead(torch.tensor([FPS]), torch.tensor([4.0]))
         mended = mender.predicted(torch.from_numpy(frames[None, :4]), times)
-    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, parallel, mender)
+    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, mender)
     mended.numpy().astype("<f4").tofile(FOLDER / "mended.f32")
-    mean.numpy().astype("<f4").tofile(FOLDER / "expected.f32")
     tables = TransformerTables.of(net)
     write_whole(transformer_bytes(tables, row_bytes=1), FOLDER / "rows_in_bytes.maqr")
     stored = read_code_file(bundle / "codes.maqc")

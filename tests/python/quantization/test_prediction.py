@@ -16,13 +16,11 @@ from export.bundle import BundleInfo
 from export.clips.clip import write_clip
 from export.clips.shapes import shapes_clip
 from export.densepose.graphs import session
-from export.onnx_graphs import largest_difference
 from export.prediction.autoencoder import Autoencoder
 from export.prediction.bundle import CODES, TRANSFORMER
 from export.prediction.codes import CodedClips, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
 from export.prediction.export_onnx import export_bundle
-from export.prediction.parallel import ParallelTransformer
 from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.table import CodeTable
 from export.prediction.transformer import LatentTransformer
@@ -40,26 +38,12 @@ SHAPE = TransformerShape(
 
 @torch.no_grad()
 def transformer(table: CodeTable) -> LatentTransformer:
-    net = disturbed(LatentTransformer(SHAPE))
-    net.table.copy_(table.stacked())
-    return net
-
-
-@torch.no_grad()
-def disturbed(net: LatentTransformer | ParallelTransformer) -> LatentTransformer | ParallelTransformer:
+    net = LatentTransformer(SHAPE)
     for parameter in net.parameters():  # heads and biases begin at zero
         parameter.add_(0.1 * torch.randn_like(parameter))
     net.context.rows.weight[-1] = 0
+    net.table.copy_(table.stacked())
     return net.eval()
-
-
-def expected_error(fp32: Path, int8: Path) -> float:
-    """Of the expected frame, relative to its largest number."""
-    given = {
-        "before": np.random.default_rng(0).integers(-1, 16, (1, 8, 256)).astype(np.float32),
-        "times": np.float32([[0, 1]]),
-    }
-    return largest_difference(*(session(folder / "expected.onnx").run(None, given)[0] for folder in (fp32, int8)))
 
 
 def assert_samples_do_not_depend_on_each_other(int8: Path) -> None:
@@ -91,9 +75,7 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     net.eval()
     table = CodeTable.counted(torch.randint(16, (3, 5, 2, 16, 16)), 16)
     fp32, int8 = tmp_path / "fp32", tmp_path / "int8"
-    export_bundle(
-        net, table, fp32, BundleInfo("small", "fp32"), transformer(table), disturbed(ParallelTransformer(SHAPE))
-    )
+    export_bundle(net, table, fp32, BundleInfo("small", "fp32"), transformer(table))
     codes = torch.randint(16, (2, 6, 2, 16, 16), dtype=torch.int16)
     codes[:, 1:] = torch.where(torch.rand(codes[:, 1:].shape) < 0.7, codes[:, :1], codes[:, 1:])
     motion = codes[:, :, None].expand(-1, -1, 5, -1, -1, -1)
@@ -111,11 +93,9 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
     assert measured["equal_codes"] > 0.9
     assert measured["psnr_db_int8"] == pytest.approx(measured["psnr_db_fp32"], abs=0.3)
     assert measured["bits_int8"] == pytest.approx(measured["bits_fp32"], rel=0.02)
-    assert 0 < expected_error(fp32, int8) < 0.05
     assert_samples_do_not_depend_on_each_other(int8)
     assert manifest["precision"] == "int8"
     assert manifest["transformer"] == {"file": TRANSFORMER, "fps": [10, 30]}
-    assert manifest["expected"] == {"before": 3, "frames": 4, "max_ahead": 12, "fps": [10, 30]}
     assert (int8 / CODES).read_bytes() == (fp32 / CODES).read_bytes()
     for name in ("encoder.onnx", TRANSFORMER):  # graphs of such small transformers are hardly weights
         sizes = [(folder / name).stat().st_size for folder in (fp32, int8)]

@@ -1,6 +1,5 @@
 """Scene files in numpy, and fine-tuning: on a made-up room, with random networks."""
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -163,18 +162,6 @@ def test_the_loss_falls(place):
     assert all(torch.equal(a, b) for a, b in zip(refiner, model.networks.refiner.parameters(), strict=True))
 
 
-def test_the_refiner_learns_where_it_may(place):
-    capture, scene = read_capture(place / "room"), read_scene_file(place / "8-bit.maqs")
-    views = [capture.view(k) for k in capture.sources()]
-    networks = finetune.networks_of_bundle(place / "weights.pt", place / "bundle", views[0], scene.up)
-    model = TunedScene(scene, networks, torch.device("cpu"))
-    tuning = Tuning(model, views, Rates(0, 0, 3e-3), LossWeights())
-    means = model.mean.detach().clone()
-    losses = [np.mean([tuning.step() for _ in range(len(views))]) for _ in range(8)]
-    assert losses[-1] < 0.98 * losses[0]
-    assert torch.equal(means, model.mean.detach())
-
-
 def test_weights_of_other_networks_are_refused(place, tmp_path):
     torch.manual_seed(7)
     save_networks(Networks(SIZES["tiny"]), tmp_path / "others.pt")
@@ -219,18 +206,6 @@ def test_a_tuned_scene_differs_in_its_descriptors_alone(place, tmp_path, monkeyp
     said = capsys.readouterr().out
     assert "before: " in said
     assert "after 1 s: " in said
-
-
-def test_a_tuned_refiner_has_a_bundle_that_its_scene_names(place, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "argv", arguments(place, "--seconds", "1", "--out", tmp_path / "tuned.maqs", "--refiner"))
-    finetune.main()
-    folder = tmp_path / "tuned-networks"
-    manifest = json.loads((folder / "manifest.json").read_text())
-    assert read_scene_file(tmp_path / "tuned.maqs").networks_sha256 == identity(manifest)
-    for name, same in (("extractor.onnx", True), ("basis.bin", True), ("refiner.onnx", False)):
-        data = (folder / name).read_bytes()
-        assert hashlib.sha256(data).hexdigest() == manifest["files"][name]["sha256"]
-        assert (data == (place / "bundle" / name).read_bytes()) == same
 
 
 def test_a_scene_of_other_networks_is_refused(place, tmp_path, monkeypatch):

@@ -21,7 +21,7 @@ UNSEEN = -1  # code of a frame before the stream's first
 
 
 class ContextNetwork(nn.Module):
-    """Codes of the frames before, and of the one that motion predicts -> features of each place of the frame to come."""
+    """Codes of the frames before and of the frame that motion predicts -> features of each cell of the next frame."""
 
     def __init__(self, shape: TransformerShape) -> None:
         super().__init__()

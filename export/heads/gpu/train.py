@@ -218,12 +218,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pack", type=Path)
     parser.add_argument(
-        "--start", type=Path, default=Path("export/weights/heads-encoder.pt"), help="encoder to begin with"
+        "--start", type=Path, default=Path("export/weights/heads-encoder.pt"), help="initial weights of the encoder"
     )
     parser.add_argument(
         "--detector",
         type=Path,
-        help="begin with trunk and neck of these weights (export/weights/densepose-b.pt) instead",
+        help="initial trunk and neck, such as export/weights/densepose-b.pt, in place of --start",
     )
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder-gpu"))
     parser.add_argument("--seconds", type=float, default=520, help="from start to end, all told")

@@ -3,8 +3,8 @@
     python -m export.prediction.pictures.evaluate --sets pushing --split val
 
 Prints PSNR in dB at 64 x 64 pixels, the mean over frames spread over all clips. `convolutional` predicts from frames
-alone, `mender` refines the prediction of `auto`. `best` is the better one of the last frame and motion; a useful network
-is above it.
+alone, `mender` refines the prediction of `auto`. `best` is the better one of the last frame and motion; a useful
+network is above it.
 """
 
 from __future__ import annotations

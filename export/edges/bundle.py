@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from export.bundle import LICENCE, BundleInfo, signature_of
+from export import data_sources as sources
+from export.bundle import BundleInfo, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.edges.config import EPS_R, FOLD, INPUT_PLANES, NetworkConfig
 
 GRAPHS = ("field",)
-TRAINING_DATA = (
-    {"name": "Maquette rendered solids (export.solids)", "licence": LICENCE, "used_for": "training, calibration"},
-)
+TRAINING_DATA = (sources.RENDERED_SOLIDS.used_for("training, calibration"),)
 
 
 def signature(config: NetworkConfig) -> dict[str, dict[str, list[int | str]]]:

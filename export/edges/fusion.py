@@ -1,18 +1,18 @@
-"""Fields of several posed views as one: the pairwise rule of DEF (arXiv 2011.15081), in float64.
+"""Fuses the fields of several posed views: the pairwise rule of DEF (arXiv 2011.15081), in float64.
 
-For each ordered pair of views, the target's points are moved into the source's camera, and the source's field is
-interpolated where it saw the same surface. A target then has up to one value from each view, its own among them, and a
-rule makes one of them. The reference for sdk/src/edges/fusion, whose targets are points on a grid instead of pixels.
+For each ordered pair of views, the points of the target view are moved into the camera of the source view, and the
+source's field is interpolated where that view saw the same surface. A target then has at most one value from each view,
+including its own, and gets the mean of the smaller half of them. This is the reference for sdk/src/edges/fusion, whose
+targets are points on a grid instead of pixels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from export.camera import Camera
 from export.edges.config import EPS_R
@@ -23,8 +23,6 @@ FAR = 0.9  # of EPS_R: a view whose distance is beyond says no more than that
 FACING = 0.1  # cosine between a surface and the way to the camera, at least
 WINDOW_PX = 2  # to either side, in which a surface's normal is fitted
 MIXED = 0.3  # length of the mean normal of a cell's points, at least
-SMALLEST = 3  # values of which `smallest` is the mean
-PAPER_NEIGHBOURS, PAPER_REACH_R = 8, 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,27 +147,14 @@ def targets_of(view: FieldView, step_px: int = 1) -> Targets:
 
 def values_of(views: Sequence[FieldView], targets: Targets, reach_r: float = REACH_R) -> Values:
     """Interpolated between those of the four pixels about each target's place that lie within reach_r of it."""
-    return _values(views, targets, lambda view, at: _bilinear(view, at, reach_r))
-
-
-def paper_values_of(views: Sequence[FieldView], targets: Targets) -> Values:
-    """As published: a plane through the 8 nearest samples, all within 6 r, whichever way they face."""
-    return _values(views, targets, _nearest_samples)
-
-
-Interpolation = Callable[[FieldView, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-
-
-def _values(views: Sequence[FieldView], targets: Targets, interpolation: Interpolation) -> Values:
     shape = len(views), len(targets.point)
     distance, spread = np.full(shape, np.nan), np.full(shape, np.nan)
     for k, view in enumerate(views):
         # The camera's place first: far from the origin, differences of coordinates are what is exact.
         at = (targets.point - view.camera.centre) @ view.camera.rotation.T
-        d, s, depth = interpolation(view, at)
-        if interpolation is not _nearest_samples:
-            facing = -((targets.normal @ view.camera.rotation.T) * at).sum(1) / np.linalg.norm(at, axis=1)
-            d = np.where(facing > FACING, d, np.nan)
+        d, s, depth = _bilinear(view, at, reach_r)
+        facing = -((targets.normal @ view.camera.rotation.T) * at).sum(1) / np.linalg.norm(at, axis=1)
+        d = np.where(facing > FACING, d, np.nan)
         r = depth / view.focal_px
         far = d > FAR * EPS_R
         distance[k] = np.where(far, EPS_R * targets.r_m, np.minimum(d * r, EPS_R * targets.r_m))
@@ -202,69 +187,12 @@ def _bilinear(view: FieldView, at: np.ndarray, reach_r: float) -> tuple[np.ndarr
     return tuple(np.where(seen, plane / np.where(seen, total, 1), np.nan) for plane in sums)
 
 
-def _nearest_samples(view: FieldView, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    known = view.depth > 0
-    samples, z = view.points[known], view.depth[known]
-    away, index = cKDTree(samples).query(at, k=PAPER_NEIGHBOURS)
-    seen = (away * view.focal_px <= PAPER_REACH_R * z[index]).all(1)
-    sums = []
-    y, x = np.nonzero(known)
-    px = np.stack([x, y], -1).astype(float)
-    pixel = at[:, :2] / at[:, 2:] * [view.camera.fx_px, view.camera.fy_px] + [view.camera.cx_px, view.camera.cy_px]
-    a = np.concatenate([px[index] - pixel[:, None], np.ones((*index.shape, 1))], 2)
-    left = np.linalg.pinv(a[seen]) if seen.any() else np.zeros((0, 3, PAPER_NEIGHBOURS))
-    for plane in (view.distance, view.spread, view.depth):
-        own = plane[known][index]
-        fitted = np.full(len(at), np.nan)
-        fitted[seen] = np.einsum("nk,nk->n", left[:, 2], own[seen])
-        sums.append(np.clip(fitted, own.min(1), own.max(1)))
-    return tuple(sums)
-
-
-def _minimum(values: Values) -> np.ndarray:
-    return np.nanmin(values.distance, 0)
-
-
-def _median(values: Values) -> np.ndarray:
-    return np.nanmedian(values.distance, 0)
-
-
-def _mean(values: Values) -> np.ndarray:
-    return np.nanmean(values.distance, 0)
-
-
-def _smallest(values: Values) -> np.ndarray:
-    return np.nanmean(np.sort(values.distance, 0)[:SMALLEST], 0)
-
-
-def _lower_half(values: Values) -> np.ndarray:
-    """The mean of the smaller half of the values, of an odd number with the middle one."""
-    order = np.sort(values.distance, 0)
+def fused(values: Values) -> np.ndarray:
+    """Distance [N] in metres: the mean of the smaller half of the views' values, including the middle one of an odd
+    number; NaN where no view saw the target."""
+    order = np.sort(values.distance, 0)  # NaN last
     count = (~np.isnan(order)).sum(0)
+    half = (count + 1) // 2
     rank = np.arange(len(order))[:, None]
-    return np.where(rank < (count + 1) // 2, np.nan_to_num(order), 0).sum(0) / np.maximum((count + 1) // 2, 1)
-
-
-def _weighted(values: Values) -> np.ndarray:
-    """By the inverse square of the spread that the network expects."""
-    weight = np.where(np.isnan(values.distance), 0, 1 / np.maximum(values.spread, 1e-12) ** 2)
-    weight = np.nan_to_num(weight)
-    return (weight * np.nan_to_num(values.distance)).sum(0) / np.maximum(weight.sum(0), 1e-300)
-
-
-RULES: dict[str, Callable[[Values], np.ndarray]] = {
-    "minimum": _minimum,
-    "median": _median,
-    "mean": _mean,
-    "mean of the 3 smallest": _smallest,
-    "mean of the lower half": _lower_half,
-    "weighted by the spread": _weighted,
-}
-
-
-def fused(values: Values, rule: str) -> np.ndarray:
-    """Distance [N] in metres by a rule of RULES; NaN where no view saw the target."""
-    seen = ~np.isnan(values.distance).all(0)
-    out = np.full(len(seen), np.nan)
-    out[seen] = RULES[rule](Values(values.distance[:, seen], values.spread[:, seen]))
-    return out
+    mean = np.where(rank < half, np.nan_to_num(order), 0).sum(0) / np.maximum(half, 1)
+    return np.where(count > 0, mean, np.nan)

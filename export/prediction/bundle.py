@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from export.bundle import LICENCE, BundleInfo, Signature, signature_of
+from export import data_sources as sources
+from export.bundle import BundleInfo, Signature, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
@@ -18,18 +19,10 @@ CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
 TRAINED_FPS = (10, 30)  # of the clips that transformers were trained on
 CELL_PX = 4  # pixels of a place, both ways
 TRAINING_DATA = (
-    {
-        "name": "Maquette clips: shapes, pushing, collages (export.clips)",
-        "licence": LICENCE,
-        "used_for": "training, calibration",
-    },
-    {
-        "name": "background photographs of export/photos/packages.toml",
-        "licence": "MIT, BSD-3-Clause, Apache-2.0, CC0-1.0, CC-BY-4.0",
-        "used_for": "training of the autoencoder, collages",
-    },
-    {"name": "Franka Panda arm and objects of pybullet_data", "licence": "Apache-2.0, zlib", "used_for": "rendering"},
-    {"name": "KUKA iiwa arm of pybullet_data", "licence": "BSD-2-Clause", "used_for": "rendering"},
+    sources.RENDERED_CLIPS.used_for("training, calibration"),
+    sources.BACKGROUNDS.used_for("training of the autoencoder, collages"),
+    sources.PANDA_ARM.used_for("rendering"),
+    sources.KUKA_ARM.used_for("rendering"),
 )
 
 

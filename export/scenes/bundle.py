@@ -6,16 +6,13 @@ import hashlib
 import json
 from pathlib import Path
 
+from export import data_sources as sources
 from export.bundle import LICENCE, BundleInfo, signature_of
 from export.bundle import write_manifest as write_bundle_manifest
 
 GRAPHS = ("extractor", "refiner")
 BASIS = "basis.bin"
-TRUNK = {
-    "name": "MobileNetV2 in ssd_mobilenet_v2_coco_2018_03_29 (TensorFlow detection model zoo, trained on COCO)",
-    "licence": "Apache-2.0",
-    "used_for": "first weights of the extractor's trunk; comparing pictures",
-}
+TRUNK = sources.DETECTOR_TRUNK.used_for("first weights of the extractor's trunk; comparing pictures")
 
 
 def training_data(places: Path) -> list[dict[str, str]]:

@@ -1,11 +1,11 @@
 """View-dependent descriptors: the ridge regression of NPBG++ (arXiv 2203.13318, section 3.3), for all points of a cloud
 at once and differentiable.
 
-The reference for the SDK's `DescriptorRegression` (sdk/src/scene/assembly/descriptor_regression.h). From K views,
-features y and basis values h: (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0, beta0 = mean y; the descriptor
-is y(h) = beta0 + h beta. Means and the scatter around them are kept, not sums, so that the right side of a point seen
-once, or always from the same side, is exactly 0. The SDK keeps the scatter's Cholesky factor, which is more exact in
-float; here is float64.
+This is the reference for the SDK's `DescriptorRegression` (sdk/src/scene/assembly/descriptor_regression.h). From K
+views with features y and basis values h: (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0, beta0 = mean y. The
+descriptor is y(h) = beta0 + h beta. Means and the scatter around them are kept instead of sums, so that the right side
+of a point seen once, or always from the same side, is exactly 0. This module uses float64; the SDK uses float and keeps
+the Cholesky factor of the scatter, which is more exact.
 """
 
 from __future__ import annotations

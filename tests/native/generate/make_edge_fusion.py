@@ -67,7 +67,7 @@ def made() -> dict:
         "cell_m": cell_m,
         "points": np.round(targets.point, 7).tolist(),
         "normals": np.round(targets.normal, 4).tolist(),
-        "distance_m": np.round(fused(values, "mean of the lower half"), 7).tolist(),
+        "distance_m": np.round(fused(values), 7).tolist(),
         "views_of_point": (~np.isnan(values.distance)).sum(0).tolist(),
     }
 

@@ -16,9 +16,9 @@ from tqdm import tqdm
 
 from benchmarks.sweep import BLOCK, Column, Replay, Setting, pareto
 from export.evaluation import photos, views
+from export.evaluation.json_values import plain
 from export.evaluation.measure import Tally
 from export.evaluation.photos import PhotoSet
-from export.evaluation.plain import plain
 from export.shards import LabelledImage
 from export.teachers.label import PhotoLabels
 

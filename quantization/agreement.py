@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from export.bundle import MANIFEST, read_manifest, signed
 from export.evaluation.backends import DEFAULT_PATHS, Backend, Prediction, open_backend
-from export.evaluation.plain import plain
+from export.evaluation.json_values import plain
 from export.evaluation.sheet import pictures
 from export.evaluation.surface_accuracy import fraction
 from export.shards import count_images, read_images, shard_paths

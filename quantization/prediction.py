@@ -3,7 +3,7 @@
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
 What stays float is in `quantization/prediction.toml`; a transformer is made int8 as `quantization/transformer.py` says.
-`python -m quantization.mended` adds the network that mends what is foreseen, afterwards. Prints sizes, each output's
+`python -m quantization.prediction_refiner` adds the network that mends what is foreseen, afterwards. Prints sizes, each output's
 signal to noise ratio, and what int8 costs on frames of validation clips: codes that stay the same, PSNR of frames that
 were made codes and frames again, and bits a code by the transformer.
 """
@@ -25,8 +25,8 @@ from export.prediction.bundle import CODES, GRAPHS, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
-from export.prediction.pictures.mended_graph import MENDED
-from export.prediction.pictures.picture_error import psnr_db
+from export.prediction.refiner.image_error import psnr_db
+from export.prediction.refiner.refiner_graph import MENDED
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings

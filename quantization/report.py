@@ -23,7 +23,7 @@ from rich.table import Table
 
 from export.densepose.graphs import Bundle, open_bundle
 from export.evaluation.backends import fingerprint
-from export.evaluation.plain import plain
+from export.evaluation.json_values import plain
 from export.shards import load_records
 from quantization import agreement, check
 from quantization.analysis.comparison import TensorError, activation_errors, weight_errors, worst_first

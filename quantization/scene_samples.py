@@ -16,7 +16,7 @@ from export.scenes.config import MULTIPLE
 from export.scenes.fitting import Options, fitted_to_views, gathered, render
 from export.scenes.geometry.cameras import upright
 from export.scenes.geometry.source_views import scores
-from export.scenes.picture_quality import psnr_db
+from export.scenes.image_quality import psnr_db
 from quantization.bundle_networks import BundleNetworks
 from quantization.samples import Sample
 

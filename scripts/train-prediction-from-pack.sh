@@ -37,7 +37,7 @@ for counts in "train 2500" "val 32"; do
     --processes "${PROCESSES:-5}"
 done
 sets="pushing shapes collages"
-"$python" -m export.prediction.pictures.train_convolutional --sets $sets --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
+"$python" -m export.prediction.refiner.train_convolutional --sets $sets --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3 >convolutional.log 2>&1 &
 convolutional=$!
 "$python" -m export.prediction.train_autoencoder --sets $sets --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
@@ -45,11 +45,11 @@ convolutional=$!
 keep prediction-autoencoder autoencoder
 "$python" -m export.prediction.codes --sets $sets --processes "${PROCESSES:-5}"
 for split in train val; do
-  "$python" -m export.prediction.pictures.foreseen --sets $sets --split $split --processes "${PROCESSES:-5}"
+  "$python" -m export.prediction.refiner.auto_predictions --sets $sets --split $split --processes "${PROCESSES:-5}"
 done
 minutes=$(spare 0.95)
-"$python" -m export.prediction.pictures.train_convolutional --sets $sets --foreseen .data/prediction/foreseen \
-  --out .data/runs/prediction-mender --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
+"$python" -m export.prediction.refiner.train_convolutional --sets $sets --foreseen .data/prediction/foreseen \
+  --out .data/runs/prediction-refiner --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
   >mender.log 2>&1 &
 mender=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \

@@ -24,8 +24,8 @@ from benchmarks.edges.quality import LEVELS
 from export.edges.config import EPS_R
 from export.edges.curve_metrics import score
 from export.edges.data import seen_by
+from export.edges.evaluation_mask import JudgedPixels, judged_pixels
 from export.edges.fusion import FieldView
-from export.edges.judged_pixels import JudgedPixels, judged_pixels
 from export.solids import sensors
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from benchmarks.heads.quality import BACKGROUNDS, BUNDLE, DATA, METRICS, ONE, OT
 from export.camera import Camera
 from export.evaluation.paint import labelled_tile, mosaic
 from export.heads.head_shards import CROP_SIDES
-from export.heads.made_heads import make_maker
+from export.heads.synthetic_heads import make_maker
 
 TILE_PX = 224
 PHOTOS = Path(".data/photos/test")

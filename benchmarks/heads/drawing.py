@@ -14,9 +14,9 @@ from maquette import HeadMesh
 from benchmarks.heads.fitted import DM_PER_M
 from benchmarks.heads.other_heads import PEOPLE, load_head
 from export.camera import Camera
-from export.heads.made_heads import make_head
 from export.heads.sampling import Lamps, look_at, sample_camera, sample_extras, sample_lamps
 from export.heads.surface import HeadMaker, Place
+from export.heads.synthetic_heads import make_head
 from export.heads.views import HeadViews, Scene, Seen
 
 # Vertex colours contain the photo's light; more light would saturate them at 255.

@@ -19,9 +19,9 @@ from benchmarks.heads.face_mesh import is_inner_face
 from benchmarks.heads.visible import seen_from, seen_from_outside
 from export.camera import Camera
 from export.heads.head_shards import HeadPictures, is_face, read_pictures
-from export.heads.made_heads import make_head
 from export.heads.sampling import sample_extras
 from export.heads.surface import Head, HeadMaker, cut_distance
+from export.heads.synthetic_heads import make_head
 
 HEAD = 255  # threshold of masks
 MAX_YAW_DEG, MAX_PITCH_DEG = 45.0, 35.0

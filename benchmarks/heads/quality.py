@@ -43,8 +43,8 @@ from benchmarks.heads.photos import (
 )  # fmt: skip
 from benchmarks.heads.targets import ONE, OTHER, THREE
 from export.evaluation.machine import describe_machine
-from export.heads.made_heads import make_maker
 from export.heads.surface import HeadMaker
+from export.heads.synthetic_heads import make_maker
 from export.photos.packages import PackageError
 from export.scenes.perceptual import Perceptual, load_perceptual
 

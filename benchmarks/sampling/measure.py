@@ -11,7 +11,7 @@ from benchmarks.sampling import frechet, times, uncertainty
 from benchmarks.sampling.continuations import GIVEN, MADE, SAMPLES, continued
 from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
-from export.prediction.pictures.picture_error import psnr_db
+from export.prediction.refiner.image_error import psnr_db
 
 AHEAD = (1, 2, 4, 8, 11)  # frames ahead in the tables
 FAR = slice(4, MADE)  # 5 to 11 frames ahead

@@ -26,8 +26,8 @@ from benchmarks.scenes.settings import SHIPPED, Setting, Sources
 from export.camera import Camera
 from export.point_cloud import PointCloudError
 from export.scenes.captures import Capture, CaptureError, read_capture
+from export.scenes.image_quality import psnr_db, ssim
 from export.scenes.perceptual import Perceptual
-from export.scenes.picture_quality import psnr_db, ssim
 
 BASELINES = ("nearest photo", "plain points", "points as squares of 3 pixels", "pyramid of points")
 SHOWN = ("as shipped", *BASELINES[:2], BASELINES[3])  # captures in the contact sheet

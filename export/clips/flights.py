@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter1d
 from export.camera import Camera
 from export.clips.clip import FRAMES, LARGE_PX, SPLITS, Clip, generator
 from export.clips.film import filmed
+from export.clips.handheld_motion import sway
 from export.clips.place_film import PlaceFilm, PlaceMoment, asset_facts, stock_of
-from export.clips.sway import sway
 from export.places.cameras import Lens, looking
 from export.places.recipe import LAYOUTS, NothingSeenError, choose_exposure, choose_views, sound
 from export.places.render import Renderer

@@ -16,8 +16,8 @@ from export.camera import Camera
 from export.clips.clip import FRAMES, SPLITS, Clip, generator
 from export.clips.film import filmed
 from export.clips.flights import RATES_FPS, lens_of
+from export.clips.handheld_motion import sway
 from export.clips.place_film import PlaceFilm, PlaceMoment, asset_facts, stock_of
-from export.clips.sway import sway
 from export.clips.walkers import Walker, walker
 from export.people.motion import MotionClip, load_motion_clips
 from export.places.cameras import Lens, looking

@@ -14,7 +14,7 @@ from maquette import MaquetteError
 from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
 from export.evaluation.measure import Figures, image_ranges, measure
-from export.evaluation.picture import write_picture
+from export.evaluation.plot import write_picture
 from export.jobs import Workers
 from export.shards import count_images, shard_paths
 

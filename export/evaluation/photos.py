@@ -21,6 +21,7 @@ from export.evaluation.backends import Backend, Prediction, fingerprint, open_ba
 from export.evaluation.breakdown import GroupFigures, breakdown, left_right, mean_mask_iou, part_accuracy
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
+from export.evaluation.json_values import plain
 from export.evaluation.machine import describe_machine
 from export.evaluation.people import (
     LONG_SIDE_PX,
@@ -32,7 +33,6 @@ from export.evaluation.people import (
     plain_box,
     touches_frame,
 )
-from export.evaluation.plain import plain
 from export.evaluation.surface_accuracy import fraction
 from export.surface import LIMB_SIDE
 from export.teachers.label import PhotoLabels

@@ -13,10 +13,10 @@ from rich.table import Table
 from export.evaluation.average_precision import THRESHOLDS
 from export.evaluation.breakdown import GroupFigures
 from export.evaluation.calibration import BINS
+from export.evaluation.json_values import plain
 from export.evaluation.machine import describe_machine
 from export.evaluation.measure import Figures
 from export.evaluation.photos import PhotoFigures
-from export.evaluation.plain import plain
 from export.surface import PART_NAMES
 
 SCHEMA = "maquette-evaluation-2"

@@ -149,7 +149,9 @@ def export_field(prior: Prior, path: Path) -> float:
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group()
-    source.add_argument("--encoder", type=Path, metavar="FILE", help="weights.pt of export.heads.gpu.train")
+    source.add_argument(
+        "--encoder", type=Path, metavar="FILE", help="weights.pt of export.heads.encoder_training.train"
+    )
     source.add_argument("--random", action="store_true", help="an untrained encoder, to try the runtime with")
     parser.add_argument("--prior", type=Path, required=True, metavar="FILE", help="prior.maqp")
     parser.add_argument(

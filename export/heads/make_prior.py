@@ -16,11 +16,11 @@ import torch
 
 from export.heads.field import FieldBases
 from export.heads.head_shards import read_points
-from export.heads.made_heads import make_maker
 from export.heads.prior import FieldShape, Layer, Prior
 from export.heads.prior_file import write_prior
 from export.heads.shapes import CUT_NORMAL, CUT_POINT, DOMAIN, HeadShapes
 from export.heads.surface import HeadMaker, cut_distance
+from export.heads.synthetic_heads import make_maker
 
 ANCHORS = 800
 SHARPNESS = 150.0  # 1/dm: a surface some 0.3 mm thick, that of the prior's own error

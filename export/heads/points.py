@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from export.heads.head_shards import HeadPoints
-from export.heads.made_heads import shard_parser, write_shards
 from export.heads.sampling import sample_lamps
 from export.heads.shapes import DOMAIN
 from export.heads.surface import Head
+from export.heads.synthetic_heads import shard_parser, write_shards
 
 SURFACE, NEAR, FAR = 8000, 10000, 3000
 NEAR_SIGMA = (0.03, 0.15)  # dm, half of the near points each

@@ -15,9 +15,9 @@ from pathlib import Path
 import igl
 import numpy as np
 
-from export.heads.made_heads import make_maker
 from export.heads.shapes import CUT_NORMAL, ORIGIN_M, boundary_loops
 from export.heads.surface import HeadMaker, cut_distance
+from export.heads.synthetic_heads import make_maker
 from export.heads.template_file import Kind, Template, write_template
 from export.people import assets
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures
-from export.heads.made_heads import shard_parser, write_shards
 from export.heads.sampling import sample_camera, sample_extras, sample_lamps
 from export.heads.surface import Head
+from export.heads.synthetic_heads import shard_parser, write_shards
 from export.heads.views import HeadViews, Seen
 
 

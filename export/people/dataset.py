@@ -19,8 +19,8 @@ import numpy as np
 from tqdm import tqdm
 
 from export.jobs import Workers, results
+from export.people.augmentation import VARIETIES
 from export.people.scene import SPLITS, Studio
-from export.people.variety import VARIETIES
 from export.shards import ShardWriter
 
 

@@ -13,6 +13,7 @@ from export.camera import Camera
 from export.people import assets
 from export.people.animals import load_animals
 from export.people.atlas import Atlas
+from export.people.augmentation import CLOSE, Variety
 from export.people.body import Body, Shape, sample_phenotype
 from export.people.imaging import camera_faults, lens_map, through_lens
 from export.people.lookup import LabelLookup
@@ -20,7 +21,6 @@ from export.people.motion import load_clips, load_photo_poses
 from export.people.panoramas import load_panoramas
 from export.people.render import Light, Picture, Renderer
 from export.people.staging import Director
-from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model
 
 SPLITS = {"train": 0, "val": 1, "test": 2}

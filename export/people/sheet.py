@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from export.people.augmentation import VARIETIES
 from export.people.scene import SPLITS, Studio
-from export.people.variety import VARIETIES
 from export.shards import visible_boxes
 
 

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from export.camera import Camera
 from export.people.animals import Animal
+from export.people.augmentation import CLOSE, Variety
 from export.people.body import Shape
 from export.people.motion import Clips, PhotoPoses, Pose, clip_pose, drawn_pose, lying, photo_pose, posed
 from export.people.props import Prop, PropMaker
 from export.people.render import Person
-from export.people.variety import CLOSE, Variety
 from export.people.wardrobe import Fabrics, Model, brim, dress
 
 _LOOK = np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]])  # camera axes in the world before pitch and roll

@@ -16,10 +16,10 @@ from scipy.spatial import cKDTree
 
 from export.people import assets
 from export.people.atlas import REGIONS, Atlas, vertex_regions
+from export.people.augmentation import CLOSE, Variety
 from export.people.body import Body
 from export.people.motion import split_of
 from export.people.props import Prop
-from export.people.variety import CLOSE, Variety
 
 # Skin tones from light to dark (RGB), and the mean colour of the skin texture that they re-tint.
 _TONES = np.array(

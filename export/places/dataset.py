@@ -134,7 +134,7 @@ def _work(job: tuple) -> str:
     plain = options.pop("plain")
     if (split, data, plain) not in _stocks:
         if plain:
-            from export.places.plain import PlainStock as Stock
+            from export.places.geometry_only import PlainStock as Stock
 
             _stocks[split, data, plain] = Stock(split)
         else:

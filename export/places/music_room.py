@@ -20,8 +20,8 @@ import numpy as np
 
 from export.camera import Camera
 from export.places.cameras import Lens, looking
+from export.places.cc0_assets import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.dataset import frame_entry
-from export.places.free import DRAWN, FreeStock, bricks, landscape, weave
 from export.places.furnish import Heights, placed, quad
 from export.places.mesh import Material, part_of
 from export.places.render import Lighting, Renderer

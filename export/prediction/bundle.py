@@ -11,8 +11,8 @@ from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
 from export.prediction.graphs.transformer_graphs import CONTEXT, SLICES, head_name
-from export.prediction.motion_pictures import HORIZONS
-from export.prediction.pictures.mended_graph import MENDED
+from export.prediction.motion_images import HORIZONS
+from export.prediction.refiner.refiner_graph import MENDED
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"

@@ -25,7 +25,7 @@ from export.prediction.autoencoder import Autoencoder
 from export.prediction.codebook import used_fraction
 from export.prediction.config import CODE_SIDE
 from export.prediction.data import Clips, read_clips
-from export.prediction.motion_pictures import HORIZONS, MotionJob, is_known, motion_pictures
+from export.prediction.motion_images import HORIZONS, MotionJob, is_known, motion_pictures
 from export.prediction.table import CodeTable, bits_by_frequency, bits_by_table
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.transformer import UNSEEN

@@ -29,9 +29,9 @@ from export.prediction.codes import read_codes
 from export.prediction.config import CODE_SIDE
 from export.prediction.export_transformer import export_transformer
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.pictures.convolutional import ConvolutionalNet
-from export.prediction.pictures.mended_graph import MENDED, export_mended
-from export.prediction.pictures.train_convolutional import load_convolutional
+from export.prediction.refiner.convolutional import ConvolutionalNet
+from export.prediction.refiner.refiner_graph import MENDED, export_mended
+from export.prediction.refiner.train_convolutional import load_convolutional
 from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.train_transformer import load_transformer

@@ -33,12 +33,12 @@ from export.scenes.bundle import BASIS, identity
 from export.scenes.captures import Capture, CaptureError, read_capture
 from export.scenes.fitting import View
 from export.scenes.geometry.cameras import upright, warped
+from export.scenes.image_quality import psnr_db
 from export.scenes.losses import LossWeights
 from export.scenes.networks.extractor import STRIDE
 from export.scenes.networks.feature_scale import factors_between, scaled
 from export.scenes.networks.system import Networks, load_networks
 from export.scenes.perceptual import load_perceptual
-from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import SceneFile, SceneFileError, read_scene_file, write_scene_file
 from export.scenes.tuning import Rates, TunedScene, Tuning
 

@@ -30,11 +30,11 @@ from export.scenes.captures import Capture, CaptureError, read_captures
 from export.scenes.config import SIZES
 from export.scenes.fitting import Options, fitted_to_features, fitted_to_views, painted, render
 from export.scenes.geometry.source_views import scores
+from export.scenes.image_quality import psnr_db
 from export.scenes.losses import LossWeights, own_rasters, picture_terms
 from export.scenes.networks.extractor import STRIDE
 from export.scenes.networks.system import Networks, save_networks
 from export.scenes.perceptual import Perceptual, load_perceptual
-from export.scenes.picture_quality import psnr_db
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.training import (
     SAVE_EVERY_S,

@@ -31,9 +31,9 @@ from export.photos.packages import PackageError, fetch, load_packages
 from export.solids import shapes as s
 from export.solids.crops import MAGNIFIED, whole_views
 from export.solids.draw import spread
-from export.solids.guarded import LostError, called
 from export.solids.recipe import Made, placed, size_spanning
 from export.solids.records import Record, write_shard
+from export.solids.subprocess_guard import LostError, called
 
 VERSION = "cad-parts-1"
 FOLDER = Path(__file__).parent

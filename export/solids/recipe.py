@@ -19,7 +19,7 @@ from export.solids import families, held_out
 from export.solids import shapes as s
 from export.solids.brep import Solid, solid_of
 from export.solids.draw import Rng, Scale, spread, standing, tilt, turn
-from export.solids.guarded import LostError, called
+from export.solids.subprocess_guard import LostError, called
 
 Value = TypeVar("Value")
 SPLITS = {"train": 1, "val": 2, "test": 3}

@@ -14,11 +14,11 @@ from export.people import render
 from export.people.atlas import Atlas
 from export.people.lookup import LabelLookup
 from export.people.wardrobe import Layer, Model
+from export.teachers.body_model import JOINT, Puppet
 from export.teachers.fitting import CannotFit, Fit, Target, fit_person, inside, neck_angle
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
 from export.teachers.pose_start import SHOWN
-from export.teachers.puppet import JOINT, Puppet
 
 LONGEST_SIDE = 1024
 UNKNOWN = 255  # in channel I: this person, but no telling which part

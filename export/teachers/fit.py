@@ -42,7 +42,7 @@ class PhotoFits(Stored):
     person: int64 [N], their index in `PhotoLabels`. iou: float32 [N] of silhouette and mask. landmark_error: float32
     [N], median, torsos (inf: not fitted). reason: str [N], empty if the label may be believed. label: uint8
     [N, h, w, 3] (I, U*255, V*255), 0 beside the mask, I = 255 where no part is known; h, w: the photo's size, at most
-    1024 on the longer side. rotations: float32 [N, 19, 3, 3] of `export.teachers.puppet.JOINTS`, in the body's axes
+    1024 on the longer side. rotations: float32 [N, 19, 3, 3] of `export.teachers.body_model.JOINTS`, in the body's axes
     (NaN: not fitted).
     """
 
@@ -61,8 +61,8 @@ class PhotoFits(Stored):
 
 def fit_photo(labels: PhotoLabels, teacher) -> PhotoFits:
     """teacher: an `export.teachers.dense.DenseTeacher`."""
+    from export.teachers.body_model import JOINTS
     from export.teachers.dense import label_size
-    from export.teachers.puppet import JOINTS
 
     found = teacher.photo(labels)
     size = (*label_size(labels.mask.shape[1:]), 3)
@@ -105,8 +105,8 @@ def _teacher():
     import torch
 
     from export.people.body import Body
+    from export.teachers.body_model import Puppet
     from export.teachers.dense import DenseTeacher
-    from export.teachers.puppet import Puppet
 
     torch.set_num_threads(1)  # the tensors are small: more threads only wait for each other
     return DenseTeacher(Puppet(Body()))

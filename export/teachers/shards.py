@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.people.variety import USUAL
+from export.people.augmentation import USUAL
 from export.shards import BOX_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
 from export.surface import PART_COUNT, PART_TO_COARSE
 from export.teachers.coarse import SOMEWHERE, coarse_labels

@@ -25,7 +25,7 @@ from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
+from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.transformer import UNSEEN, LatentTransformer
 from tests.native.generate.make_tiny_prediction import tiny

@@ -10,9 +10,9 @@ pytest.importorskip("moderngl", reason="moderngl is not installed: scripts/make-
 from export.clips import flights
 from export.clips.clip import LARGE_PX
 from export.clips.film import filmed
+from export.clips.handheld_motion import sway
 from export.clips.motion import fetched_from_next
 from export.clips.place_film import PlaceFilm, PlaceMoment
-from export.clips.sway import sway
 from export.clips.walkers import steps_of, times_in
 from export.people import assets
 from export.people.motion import LIMBS, MotionClip
@@ -20,8 +20,8 @@ from export.people.props import box
 from export.places.assets import furniture_folder
 from export.places.cameras import Lens, looking
 from export.places.furnish import about_z
+from export.places.geometry_only import PlainStock
 from export.places.mesh import Material, part_of
-from export.places.plain import PlainStock
 from export.places.render import Lighting, Renderer
 
 needs_packages = pytest.mark.skipif(

@@ -9,12 +9,12 @@ import torch
 from box_crops import write_crops
 
 from export.bundle import read_manifest
-from export.edges.between import between, measure_statistics
 from export.edges.bundle import write_manifest
 from export.edges.config import EPS_R, SIZES, NetworkConfig
 from export.edges.data import Batches
 from export.edges.export_onnx import BundleInfo, export
 from export.edges.graph_field import field_of_planes, slopes_of
+from export.edges.interpolate_weights import between, measure_statistics
 from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
 from export.edges.network import EdgeNetwork, PublishedNetwork, Residual
 from export.edges.validation import field_of

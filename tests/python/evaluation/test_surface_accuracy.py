@@ -11,10 +11,10 @@ from rich.console import Console
 from export.evaluation import __main__ as command
 from export.evaluation import report
 from export.evaluation.backends import Prediction, fingerprint, open_backend
+from export.evaluation.json_values import plain
 from export.evaluation.measure import Figures, Tally, image_ranges, measure
 from export.evaluation.paint import mosaic, paint
-from export.evaluation.picture import write_picture
-from export.evaluation.plain import plain
+from export.evaluation.plot import write_picture
 from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap, sample_pixels
 from export.jobs import Workers
 from export.shards import ShardError, read_image, read_images, shard_paths

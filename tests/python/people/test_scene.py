@@ -222,7 +222,7 @@ def test_a_shard_depends_on_split_and_number_only(studio, tmp_path):
 def test_instances_labels_and_points_agree_in_every_layout(studio, monkeypatch, name):
     from dataclasses import replace
 
-    from export.people.variety import VARIETIES
+    from export.people.augmentation import VARIETIES
 
     variety = VARIETIES[name]
     for name, (_, counts) in variety.layouts.items():
@@ -244,7 +244,7 @@ def test_a_rolled_camera_turns_labels_and_background_clockwise(studio, monkeypat
     from dataclasses import replace
 
     from export.people import scene
-    from export.people.variety import CLOSE
+    from export.people.augmentation import CLOSE
 
     monkeypatch.setattr(scene, "TILTED_PEOPLE", 0.0)
     monkeypatch.setattr(studio, "_background", lambda rng, w, h: _left_half_dark(w, h))
@@ -271,7 +271,7 @@ def _left_half_dark(width: int, height: int) -> np.ndarray:
 
 
 def test_fractions_of_each_variety_sum_to_one():
-    from export.people.variety import VARIETIES
+    from export.people.augmentation import VARIETIES
 
     for variety in VARIETIES.values():
         assert sum(f for f, _ in variety.layouts.values()) == pytest.approx(1)

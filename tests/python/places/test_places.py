@@ -12,9 +12,9 @@ from export.places import assets
 from export.places.cameras import Lens, looking
 from export.places.clouds import CloudFaults, CloudMaker
 from export.places.dataset import frame_entry, held_out_views, render_place
+from export.places.geometry_only import PlainStock
 from export.places.mesh import Material, ModelError, Part, flat_normals, read_obj
 from export.places.place import PlaceError, load_place
-from export.places.plain import PlainStock
 from export.places.polygons import triangles_of
 from export.places.render import Lighting, Renderer
 from export.point_cloud import PointCloudError, read_ply, write_ply

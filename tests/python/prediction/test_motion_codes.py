@@ -18,7 +18,7 @@ from export.prediction.autoencoder import Autoencoder
 from export.prediction.codes import coded_clips, read_codes, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
 from export.prediction.data import Clips, read_clips
-from export.prediction.motion_pictures import HORIZONS, MotionJob, is_known, motion_pictures
+from export.prediction.motion_images import HORIZONS, MotionJob, is_known, motion_pictures
 from export.prediction.train_transformer import disturbed, examples, halves
 from export.prediction.transformer import UNSEEN, LatentTransformer
 

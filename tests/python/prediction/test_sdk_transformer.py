@@ -22,7 +22,7 @@ from export.prediction.export_onnx import export_bundle
 from export.prediction.graphs.code_sampler import drawn_code
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import read_transformer_file
-from export.prediction.motion_pictures import MotionJob, motion_pictures
+from export.prediction.motion_images import MotionJob, motion_pictures
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.transformer import UNSEEN, LatentTransformer

@@ -21,10 +21,10 @@ from export.prediction.bundle import CODES, TRANSFORMER
 from export.prediction.codes import CodedClips, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
 from export.prediction.export_onnx import export_bundle
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.table import CodeTable
 from export.prediction.transformer import LatentTransformer
-from quantization import mended, prediction
+from quantization import prediction, prediction_refiner
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
 
 TINY = Path("tests/native/data/tiny_transformer/bundle")
@@ -140,9 +140,9 @@ def test_the_network_that_mends_is_put_into_a_bundle_whose_rest_stays(tmp_path):
     weights = tmp_path / "weights.pt"
     torch.save({"shape": asdict(shape), "net": ConvolutionalNet(shape).state_dict()}, weights)
     settings = replace(read_settings(PREDICTION, PredictionSettings), frames=5, held_out_frames=5)
-    manifest = mended.put_mended(weights, bundle, tmp_path / "foreseen", ["shapes"], settings)
+    manifest = prediction_refiner.put_mended(weights, bundle, tmp_path / "foreseen", ["shapes"], settings)
     after = {path.name: path.read_bytes() for path in bundle.iterdir()}
-    assert {name for name in after if after[name] != before[name]} == {"mended.onnx", "manifest.json"}
+    assert {name for name in after if after[name] != before[name]} == {"prediction_refiner.onnx", "manifest.json"}
     assert manifest["mended"] == {"before": 3, "max_ahead": 12, "fps": [10, 30]}
     assert manifest["training_data"] == json.loads(before["manifest.json"])["training_data"]
     cost = manifest["measured"]["int8_cost"]

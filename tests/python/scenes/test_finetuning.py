@@ -19,10 +19,10 @@ from export.scenes.captures import Capture, read_capture
 from export.scenes.config import SIZES
 from export.scenes.export_onnx import export
 from export.scenes.fitting import Options, fitted_to_views, render
+from export.scenes.image_quality import psnr_db
 from export.scenes.losses import LossWeights
 from export.scenes.networks.feature_scale import scaled
 from export.scenes.networks.system import Networks, load_networks, save_networks
-from export.scenes.picture_quality import psnr_db
 from export.scenes.scene_file import HEAD, SceneFileError, read_scene_file, write_scene_file
 from export.scenes.tuning import Rates, TunedScene, Tuning
 from export.xxh3 import xxh3

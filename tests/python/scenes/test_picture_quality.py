@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from export.scenes.picture_quality import C1, psnr_db, ssim
+from export.scenes.image_quality import C1, psnr_db, ssim
 
 
 def pictures() -> tuple[np.ndarray, np.ndarray]:

@@ -22,10 +22,10 @@ from export.solids import shapes as s
 from export.solids.brep import solid_of
 from export.solids.crops import CROP_PX, CROPS_OF_VIEW, VIEWS, crops_of, whole_views_of
 from export.solids.draw import Scale
-from export.solids.guarded import LostError, called
 from export.solids.recipe import DEVIATION_R, FAMILIES, SPLITS, RecipeError, looking, make, without_crashes
 from export.solids.records import LIMIT_R, NO_PATCH, RecordError, packed, read_records, write_shard
 from export.solids.sheet import column
+from export.solids.subprocess_guard import LostError, called
 from export.solids.views import Seen
 
 ROOT = Path(__file__).parents[3]

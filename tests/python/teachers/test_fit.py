@@ -23,8 +23,8 @@ _INDEX = {name: k for k, name in enumerate(NAMES)}
 @pytest.fixture(scope="module")
 def teacher(one_thread):
     from export.people.body import Body
+    from export.teachers.body_model import Puppet
     from export.teachers.dense import DenseTeacher
-    from export.teachers.puppet import Puppet
 
     return DenseTeacher(Puppet(Body()))
 
@@ -36,9 +36,9 @@ def truth(teacher, bend: dict, place=(0.0, 0.05, 3.6), noise_px=3.0):
     """
     import torch
 
+    from export.teachers.body_model import JOINT, JOINTS, SHAPES, chained, turns
     from export.teachers.fitting import FOCAL, Fit, Target, torso_px
     from export.teachers.pose_start import FACING_CAMERA
-    from export.teachers.puppet import JOINT, JOINTS, SHAPES, chained, turns
 
     rng = np.random.default_rng(1)
     puppet = teacher.puppet
@@ -258,7 +258,7 @@ def test_poses_of_believed_fits_can_be_drawn_from(tmp_path, monkeypatch, capsys)
 
     from export.people import motion
     from export.teachers import poses
-    from export.teachers.puppet import JOINT, JOINTS, chained, turns
+    from export.teachers.body_model import JOINT, JOINTS, chained, turns
 
     def rotations(bend):
         local = torch.zeros(len(JOINTS), 3)

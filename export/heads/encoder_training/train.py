@@ -1,7 +1,7 @@
 """Trains the encoder of heads for a given time on pictures that are drawn while it learns, and on real faces.
 
-    python -m export.heads.gpu.pack heads.pack
-    python -m export.heads.gpu.train heads.pack --seconds 520 --out .data/runs/heads-encoder-gpu
+    python -m export.heads.encoder_training.pack heads.pack
+    python -m export.heads.encoder_training.train heads.pack --seconds 520 --out .data/runs/heads-encoder-gpu
 
 It draws, crops and learns on the graphics processor where there is one, else on the processor, with small batches, to
 try it out. Processes beside it make heads. Learning rate and end are by time. Writes weights.pt (the mean of the
@@ -34,10 +34,10 @@ from export.heads.encoder import (
     start_from_detector,
     start_from_encoder,
 )
-from export.heads.gpu.crops import Backgrounds, Cropper
-from export.heads.gpu.packed import read_heads, read_jpegs, read_real_faces
-from export.heads.gpu.pictures import Painter, Pool
-from export.heads.gpu.supply import HeadStream
+from export.heads.encoder_training.crops import Backgrounds, Cropper
+from export.heads.encoder_training.generator import HeadStream
+from export.heads.encoder_training.head_images import Painter, Pool
+from export.heads.encoder_training.packed import read_heads, read_jpegs, read_real_faces
 from export.training import Ema, SmoothedTerms, StopSignal, rate_at, save_atomically
 
 SAVE_EVERY_S = 60

@@ -1,6 +1,6 @@
 """Compares the networks with the last frame, with motion, and with the SDK's `auto` on held-out clips, by frames ahead.
 
-    python -m export.prediction.pictures.evaluate --sets pushing --split val
+    python -m export.prediction.refiner.evaluate --sets pushing --split val
 
 Prints PSNR in dB at 64 x 64 pixels, the mean over frames spread over all clips. `convolutional` predicts from frames
 alone, `mender` refines the prediction of `auto`. `best` is the better one of the last frame and motion; a useful
@@ -19,11 +19,11 @@ from torch import Tensor
 from tqdm import tqdm
 
 from export.prediction.data import Clips, read_clips
-from export.prediction.motion_pictures import HORIZONS, MotionJob, motion_pictures
-from export.prediction.pictures.convolutional import ConvolutionalNet, times_ahead
-from export.prediction.pictures.foreseen import foreseen
-from export.prediction.pictures.picture_error import psnr_db
-from export.prediction.pictures.train_convolutional import load_convolutional
+from export.prediction.motion_images import HORIZONS, MotionJob, motion_pictures
+from export.prediction.refiner.auto_predictions import foreseen
+from export.prediction.refiner.convolutional import ConvolutionalNet, times_ahead
+from export.prediction.refiner.image_error import psnr_db
+from export.prediction.refiner.train_convolutional import load_convolutional
 
 Rows = dict[str, dict[int, list[float]]]  # PSNR of each frame by method and frames ahead
 

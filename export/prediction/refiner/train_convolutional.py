@@ -1,9 +1,9 @@
 """Trains the convolutional network that predicts frames without codes; goes on where it was stopped.
 
-    python -m export.prediction.pictures.train_convolutional --sets pushing shapes --minutes 120
-    python -m export.prediction.pictures.foreseen         # first, for the one that mends what the SDK foresees:
-    python -m export.prediction.pictures.train_convolutional --foreseen .data/prediction/foreseen \\
-        --sets pushing collages --out .data/runs/prediction-mender
+    python -m export.prediction.refiner.train_convolutional --sets pushing shapes --minutes 120
+    python -m export.prediction.refiner.auto_predictions         # first, for the one that mends what the SDK foresees:
+    python -m export.prediction.refiner.train_convolutional --foreseen .data/prediction/foreseen \\
+        --sets pushing collages --out .data/runs/prediction-refiner
 
 Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Figures are PSNR of held-out clips, dB, by frames
 ahead: `network H`, beside the picture that it changes (the last frame, or what is foreseen), `base H`.
@@ -19,10 +19,10 @@ from torch import Tensor
 
 from export.prediction import run
 from export.prediction.data import Clips, read_clips
-from export.prediction.motion_pictures import HORIZONS
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
-from export.prediction.pictures.foreseen import read_foreseen
-from export.prediction.pictures.picture_error import psnr_db
+from export.prediction.motion_images import HORIZONS
+from export.prediction.refiner.auto_predictions import read_foreseen
+from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
+from export.prediction.refiner.image_error import psnr_db
 
 _BATCH = 64  # held-out frames at once
 _GAIN, _OFFSET = 0.15, 8.0  # standard deviations: natural logarithm, and grey levels

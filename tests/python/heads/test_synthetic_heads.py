@@ -14,20 +14,20 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def maker():
-    from export.heads.made_heads import make_maker
+    from export.heads.synthetic_heads import make_maker
 
     return make_maker()
 
 
 @pytest.fixture(scope="module")
 def head(maker):
-    from export.heads.made_heads import make_head
+    from export.heads.synthetic_heads import make_head
 
     return make_head(maker, "val", 4)
 
 
 def test_heads_depend_on_split_and_number_alone(maker, head):
-    from export.heads.made_heads import make_head
+    from export.heads.synthetic_heads import make_head
 
     again, other = make_head(maker, "val", 4), make_head(maker, "train", 4)
     assert np.array_equal(again.positions, head.positions)
@@ -75,7 +75,7 @@ def test_surfaces_are_closed_where_heads_are(head):
 
 
 def test_hair_lies_outside_of_the_skin(maker):
-    from export.heads.made_heads import make_head
+    from export.heads.synthetic_heads import make_head
 
     seen = set()
     for number in range(12):

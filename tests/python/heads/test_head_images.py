@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from export.heads.gpu.rasterizer import rasterized
+from export.heads.encoder_training.rasterizer import rasterized
 from export.people import assets
 
 
@@ -37,7 +37,7 @@ def test_candidates_in_parts_and_several_pictures(monkeypatch):
     corners = 40 * torch.rand(60, 1, 2, generator=random) + 12 * torch.rand(60, 3, 2, generator=random) - 6
     nearness, picture = 0.1 + torch.rand(60, 3, generator=random), torch.arange(60) % 3
     whole = rasterized(corners, nearness, picture, 32, perspective=True)
-    monkeypatch.setattr("export.heads.gpu.rasterizer._MAX_CANDIDATES", 150)
+    monkeypatch.setattr("export.heads.encoder_training.rasterizer._MAX_CANDIDATES", 150)
     parts = rasterized(corners, nearness, picture, 32, perspective=True)
     assert torch.equal(whole.pixel, parts.pixel)
     assert torch.equal(whole.face, parts.face)
@@ -53,7 +53,7 @@ needs_assets = pytest.mark.skipif(
 
 def meshes_of(head, cameras, lamps, extras):
     """`Meshes` of one whole head with what is inside left out, as the pictures with rays have it."""
-    from export.heads.gpu.supply import BUST, Meshes, extras_row, lamp_row
+    from export.heads.encoder_training.generator import BUST, Meshes, extras_row, lamp_row
     from export.heads.shapes import vertex_normals
 
     shapes = head.maker.shapes
@@ -86,11 +86,11 @@ def meshes_of(head, cameras, lamps, extras):
 @needs_assets
 def test_pictures_are_those_of_rays():
     from export.heads.encoder_data import face_box_of
-    from export.heads.gpu.pack import right_eye
-    from export.heads.gpu.pictures import Painter
+    from export.heads.encoder_training.head_images import Painter
+    from export.heads.encoder_training.pack import right_eye
     from export.heads.head_shards import HeadPictures
-    from export.heads.made_heads import make_head, make_maker
     from export.heads.sampling import sample_camera, sample_extras, sample_lamps
+    from export.heads.synthetic_heads import make_head, make_maker
     from export.heads.view_shards import picture_row
     from export.heads.views import HeadViews
 
@@ -126,10 +126,10 @@ def test_pictures_are_those_of_rays():
 
 @needs_assets
 def test_the_pack_keeps_shapes(tmp_path):
-    from export.heads.gpu.pack import packed_heads
-    from export.heads.gpu.packed import read_heads
-    from export.heads.gpu.supply import HAIR, HeadStream
-    from export.heads.made_heads import generator, make_maker
+    from export.heads.encoder_training.generator import HAIR, HeadStream
+    from export.heads.encoder_training.pack import packed_heads
+    from export.heads.encoder_training.packed import read_heads
+    from export.heads.synthetic_heads import generator, make_maker
 
     maker = make_maker()
     arrays, _ = packed_heads(maker, 40, 39)

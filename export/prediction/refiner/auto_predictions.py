@@ -1,8 +1,8 @@
 """Writes what the SDK foresees of clips by `auto`, as pictures of 64 x 64: what the network that mends it is given.
 
     python -m export.clips.dataset pushing --large --clips 700 --out .data/clips-large
-    python -m export.prediction.pictures.foreseen --data .data/clips-large --sets pushing collages
-    python -m export.prediction.pictures.foreseen --sets pushing people flights --split val
+    python -m export.prediction.refiner.auto_predictions --data .data/clips-large --sets pushing collages
+    python -m export.prediction.refiner.auto_predictions --sets pushing people flights --split val
 
 It is foreseen from frames of 320 x 240 where a clip has some, else from those of 64 x 64, whose edges are rougher, so
 that motion is less exact. A file a clip, OUT/SET/SPLIT/clip-NUMBER.npz: `frames` uint8 [T, 64, 64, 3], R, G, B;
@@ -26,7 +26,7 @@ from tqdm import tqdm
 from export.clips.clip import SIDE_PX, SPLITS, clip_paths, read_clip
 from export.jobs import Workers, results
 from export.prediction.data import Clips
-from export.prediction.motion_pictures import HORIZONS, is_known
+from export.prediction.motion_images import HORIZONS, is_known
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def read_foreseen(folders: list[Path], kinds: list[str], split: str) -> Foreseen
         names, places = " ".join(kinds), " or ".join(map(str, folders))
         raise SystemExit(
             f"Nothing is foreseen of {names} in {places} ({split}). Write it: python -m "
-            f"export.prediction.pictures.foreseen --split {split} --sets {names} --out {folders[0]}"
+            f"export.prediction.refiner.auto_predictions --split {split} --sets {names} --out {folders[0]}"
         )
     frames, pictures, fps = [], [], []
     for _, path in paths:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from export.heads.gpu.rasterizer import rasterized
-from export.heads.gpu.supply import BUST, EYE, HAIR, MAX_LAMPS, SKIN, Meshes
+from export.heads.encoder_training.generator import BUST, EYE, HAIR, MAX_LAMPS, SKIN, Meshes
+from export.heads.encoder_training.rasterizer import rasterized
 from export.heads.head_shards import FACE_RADIUS_DM, LABEL_STEP, NOSE_TIP, POINT_SCALE, SIDE
 from export.heads.shapes import CUT_NORMAL, CUT_POINT
 

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from export.clips.clip import SIDE_PX
 from export.densepose.graphs import session
 from export.onnx_graphs import largest_difference, write_graph
-from export.prediction.pictures.convolutional import ConvolutionalNet, times_ahead
+from export.prediction.refiner.convolutional import ConvolutionalNet, times_ahead
 
 MENDED = "mended"
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the largest number

@@ -1,6 +1,6 @@
 """A network on the line between two trained ones, the second of which began as the first (`--init`).
 
-    python -m export.edges.between export/weights/edges.pt RUN/weights.pt --at 0.3 --crops .data/solids/train --out w.pt
+    python -m export.edges.interpolate_weights export/weights/edges.pt RUN/weights.pt --at 0.3 --crops .data/solids/train --out w.pt
 
 Where a long training learnt its crops by heart, a network on the way there may be better than both ends (as model
 soups, arXiv 2203.05482). Means and variances of its normalisations belong to neither end and are measured anew on

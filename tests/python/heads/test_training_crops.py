@@ -5,10 +5,10 @@ import pytest
 import torch
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX, at_pixels
-from export.heads.gpu import crops
-from export.heads.gpu.crops import Backgrounds, Cropper, RealFaces
-from export.heads.gpu.faults import as_cameras_see, blurred, coarse, compressed
-from export.heads.gpu.pictures import Pool, face_boxes
+from export.heads.encoder_training import crops
+from export.heads.encoder_training.crops import Backgrounds, Cropper, RealFaces
+from export.heads.encoder_training.head_images import Pool, face_boxes
+from export.heads.encoder_training.image_corruptions import as_cameras_see, blurred, coarse, compressed
 from export.heads.head_shards import POINT_SCALE, SIDE
 
 

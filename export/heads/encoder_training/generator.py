@@ -1,6 +1,6 @@
 """Made heads as triangles with what colours them, from one small file, by processes beside the training.
 
-The file (`export.heads.gpu.pack`) has the shapes of the training heads, as sums of a few bases, and the skin. Here each
+The file (`export.heads.encoder_training.pack`) has the shapes of the training heads, as sums of a few bases, and the skin. Here each
 of them gets hair, tones and cameras anew whenever it is drawn. It takes numpy and scipy alone: what is inside other
 parts is left in: it is not visible.
 """

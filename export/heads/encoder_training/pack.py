@@ -1,6 +1,6 @@
 """One file with all that training the encoder on another machine takes: heads, skin, backgrounds, real faces.
 
-    python -m export.heads.gpu.pack heads.pack --heads 3000
+    python -m export.heads.encoder_training.pack heads.pack --heads 3000
 
 Heads are kept as weights of the principal shapes among them, which loses what is printed; photographs as JPEG.
 """
@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.heads.gpu.packed import jpegs
-from export.heads.made_heads import generator, make_maker
+from export.heads.encoder_training.packed import jpegs
 from export.heads.photos.faces import PhotoFaces, read_photos
 from export.heads.shapes import HeadShapes
 from export.heads.surface import HeadMaker
+from export.heads.synthetic_heads import generator, make_maker
 from export.people.imaging import motion_kernel
 
 BACKGROUND_PX = 256

@@ -1,7 +1,7 @@
 """Puts the network that mends what is foreseen, as int8, into an int8 bundle of prediction, in place of the one there.
 
-    python -m export.prediction.pictures.foreseen --split train      # and --split val, first
-    python -m quantization.mended --weights .data/runs/prediction-mender/weights.pt --bundle sdk/models/prediction-int8
+    python -m export.prediction.refiner.auto_predictions --split train      # and --split val, first
+    python -m quantization.prediction_refiner --weights .data/runs/prediction-refiner/weights.pt --bundle sdk/models/prediction-int8
 
 Calibrated and measured on what is foreseen of clips. Prints sizes, signal to noise, and the PSNR of its pictures in
 float and int8 beside that of what is foreseen. All else in the bundle stays as it is.
@@ -21,12 +21,12 @@ import torch
 from export.bundle import BundleInfo, bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.prediction.bundle import write_manifest
-from export.prediction.motion_pictures import HORIZONS
-from export.prediction.pictures.convolutional import times_ahead
-from export.prediction.pictures.foreseen import read_foreseen
-from export.prediction.pictures.mended_graph import MENDED, export_mended
-from export.prediction.pictures.picture_error import psnr_db
-from export.prediction.pictures.train_convolutional import load_convolutional
+from export.prediction.motion_images import HORIZONS
+from export.prediction.refiner.auto_predictions import read_foreseen
+from export.prediction.refiner.convolutional import times_ahead
+from export.prediction.refiner.image_error import psnr_db
+from export.prediction.refiner.refiner_graph import MENDED, export_mended
+from export.prediction.refiner.train_convolutional import load_convolutional
 from quantization.quantize import as_measured, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
@@ -36,7 +36,7 @@ def mended_samples(
     folder: Path, sets: Sequence[str], split: str, count: int, before: int
 ) -> tuple[list[Sample], np.ndarray]:
     """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. folder:
-    what `export.prediction.pictures.foreseen` wrote. Raises SystemExit where there is nothing."""
+    what `export.prediction.refiner.auto_predictions` wrote. Raises SystemExit where there is nothing."""
     known = read_foreseen([folder], list(sets), split)
     clips = known.clips
     total = clips.frames.shape[1]
@@ -91,7 +91,7 @@ def put_mended(weights: Path, bundle: Path, foreseen: Path, sets: Sequence[str],
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--weights", type=Path, default=Path(".data/runs/prediction-mender/weights.pt"))
+    parser.add_argument("--weights", type=Path, default=Path(".data/runs/prediction-refiner/weights.pt"))
     parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/prediction-int8"))
     parser.add_argument("--foreseen", type=Path, default=Path(".data/prediction/foreseen"))
     parser.add_argument("--sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")

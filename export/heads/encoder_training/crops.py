@@ -14,8 +14,8 @@ from torch.nn import functional as F
 
 from export.heads.encoder import CELL_PX, CELLS, CROP_PX, UNKNOWN_MATTE
 from export.heads.encoder_data import FACE_FRACTION, MAX_BILINEAR_ZOOM
-from export.heads.gpu.faults import as_cameras_see
-from export.heads.gpu.pictures import Pool
+from export.heads.encoder_training.head_images import Pool
+from export.heads.encoder_training.image_corruptions import as_cameras_see
 from export.heads.head_shards import FACE_SIDES, LABEL_STEP, POINT_SCALE
 
 CHUNK = 64  # crops cut at once: pictures are copied as floats

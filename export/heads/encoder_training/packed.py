@@ -1,4 +1,4 @@
-"""The file of `export.heads.gpu.pack`, read: it takes neither the assets nor geometry packages."""
+"""The file of `export.heads.encoder_training.pack`, read: it takes neither the assets nor geometry packages."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import torch
 
-from export.heads.gpu.crops import RealFaces
-from export.heads.gpu.supply import PackedHeads
+from export.heads.encoder_training.crops import RealFaces
+from export.heads.encoder_training.generator import PackedHeads
 
 QUALITY = 78
 

@@ -11,9 +11,9 @@ import torch
 from export.clips.clip import write_clip
 from export.clips.shapes import shapes_clip
 from export.prediction.data import Clips
-from export.prediction.motion_pictures import HORIZONS, is_known
-from export.prediction.pictures import foreseen, train_convolutional
-from export.prediction.pictures.convolutional import ConvolutionalNet, ConvolutionalShape
+from export.prediction.motion_images import HORIZONS, is_known
+from export.prediction.refiner import auto_predictions, train_convolutional
+from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.training import seed_step
 
 BUILT = pytest.mark.skipif(
@@ -75,8 +75,8 @@ def test_what_is_foreseen_of_a_clip_is_of_its_large_frames_if_it_has_some(tmp_pa
     for folder in (source.parent, path.parent):
         folder.mkdir(parents=True)
     write_clip(clip, source)
-    foreseen.write_foreseen((source, path))
-    known = foreseen.read_foreseen([tmp_path / "out"], ["shapes"], "train")
+    auto_predictions.write_foreseen((source, path))
+    known = auto_predictions.read_foreseen([tmp_path / "out"], ["shapes"], "train")
     frames, pictures = known.clips.frames[0].numpy(), known.pictures[0].numpy()
     assert known.clips.names == ["shapes/clip-00000"]
     assert known.clips.fps.tolist() == [clip.fps]
@@ -86,7 +86,7 @@ def test_what_is_foreseen_of_a_clip_is_of_its_large_frames_if_it_has_some(tmp_pa
         for t, frame in enumerate((clip.large or clip.small).rgb[:9]):
             predictor.push(maquette.Frame(np.ascontiguousarray(frame), timestamp_ns=round(t * 1e9 / clip.fps)))
         coming = predictor.predict(HORIZONS[2] / clip.fps).pixels()
-    np.testing.assert_array_equal(pictures[8, 2], foreseen.squeezed(coming))
+    np.testing.assert_array_equal(pictures[8, 2], auto_predictions.squeezed(coming))
     for t in range(30):
         for h, horizon in enumerate(HORIZONS):
             assert pictures[t, h].any() == is_known(t, horizon, 30)
@@ -116,7 +116,7 @@ def test_a_training_of_what_is_foreseen_is_a_command_that_goes_on_from_weights(t
 
 def test_nothing_foreseen_is_said(tmp_path):
     with pytest.raises(SystemExit, match=r"pictures.foreseen --split val --sets shapes"):
-        foreseen.read_foreseen([tmp_path], ["shapes"], "val")
+        auto_predictions.read_foreseen([tmp_path], ["shapes"], "val")
 
 
 def test_a_mender_that_begins_with_another_network_has_half_of_its_picture():

@@ -1,11 +1,11 @@
-"""Makes an int8 bundle of prediction from a fp32 one of export.prediction, calibrated on frames of rendered clips.
+"""Quantizes a fp32 bundle of export.prediction to int8, calibrated on frames of rendered clips.
 
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
-What stays float is in `quantization/prediction.toml`; a transformer is made int8 as `quantization/transformer.py` says.
-`python -m quantization.prediction_refiner` adds the network that mends what is foreseen, afterwards. Prints sizes, each output's
-signal to noise ratio, and what int8 costs on frames of validation clips: codes that stay the same, PSNR of frames that
-were made codes and frames again, and bits a code by the transformer.
+`quantization/prediction.toml` lists the layers that stay float; `quantization/transformer.py` quantizes the transformer.
+Afterwards, `python -m quantization.prediction_refiner` adds the refiner. The command prints sizes, the signal-to-noise
+ratio of each output, and the cost of int8 on frames of validation clips: the fraction of equal codes, the PSNR of
+reconstructed frames, and the transformer's bits a code.
 """
 
 from __future__ import annotations

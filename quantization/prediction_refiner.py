@@ -1,10 +1,11 @@
-"""Puts the network that mends what is foreseen, as int8, into an int8 bundle of prediction, in place of the one there.
+"""Quantizes the refiner to int8 and writes it into an int8 bundle of prediction, in place of the one there.
 
     python -m export.prediction.refiner.auto_predictions --split train      # and --split val, first
-    python -m quantization.prediction_refiner --weights .data/runs/prediction-refiner/weights.pt --bundle sdk/models/prediction-int8
+    python -m quantization.prediction_refiner --weights .data/runs/prediction-refiner/weights.pt \\
+        --bundle sdk/models/prediction-int8
 
-Calibrated and measured on what is foreseen of clips. Prints sizes, signal to noise, and the PSNR of its pictures in
-float and int8 beside that of what is foreseen. All else in the bundle stays as it is.
+Calibration and validation use predictions of clips by `auto`. The command prints sizes, signal-to-noise ratios, and the
+PSNR of refined images in float and int8 beside the PSNR of `auto`. The rest of the bundle stays as it is.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""A network on the line between two trained ones, the second of which began as the first (`--init`).
+"""Interpolates the weights of two trained networks, the second of which began as the first (`--init`).
 
-    python -m export.edges.interpolate_weights export/weights/edges.pt RUN/weights.pt --at 0.3 --crops .data/solids/train --out w.pt
+    python -m export.edges.interpolate_weights export/weights/edges.pt RUN/weights.pt --at 0.3 \\
+        --crops .data/solids/train --out w.pt
 
-Where a long training learnt its crops by heart, a network on the way there may be better than both ends (as model
-soups, arXiv 2203.05482). Means and variances of its normalisations belong to neither end and are measured anew on
-crops. Residual blocks that only the second has keep its weights; their output, which began at nothing, fades in.
+A long training may overfit its crops; a network between its start and its end may be better than both (model soups,
+arXiv 2203.05482). Means and variances of the normalisations are measured again on crops. Residual blocks that only the
+second network has keep their weights; their output, which began at zero, is scaled.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ CROP_PX, BATCH = 112, 32
 
 
 @torch.no_grad()
-def between(first: Path, second: Path, at: float) -> EdgeNetwork:
-    """at: 0 is the first, 1 the second, whose size the network has. Its normalisations still have the statistics of the
-    second. Raises ValueError where the second did not begin as the first could."""
+def interpolated(first: Path, second: Path, at: float) -> EdgeNetwork:
+    """The network at `at` between the first (0) and the second (1), with the size and the normalisation statistics of
+    the second. Raises ValueError where the second cannot have begun as the first."""
     network, config = load_network(second)
     start = EdgeNetwork(config)
     start_from(first, start)
@@ -47,7 +48,7 @@ def between(first: Path, second: Path, at: float) -> EdgeNetwork:
 
 @torch.no_grad()
 def measure_statistics(network: EdgeNetwork, batches: Batches, count: int) -> None:
-    """Means and variances of all normalisations over so many batches."""
+    """Replaces means and variances of all normalisations by their values over `count` batches."""
     norms = [module for module in network.modules() if isinstance(module, nn.BatchNorm2d)]
     for norm in norms:
         norm.reset_running_stats()
@@ -63,14 +64,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("first", type=Path)
     parser.add_argument("second", type=Path)
-    parser.add_argument("--at", type=float, required=True, help="0: the first, 1: the second")
+    parser.add_argument("--at", type=float, required=True, help="0: the first network, 1: the second")
     parser.add_argument("--crops", type=Path, required=True, help="shards, or a file of export.solids.compact")
-    parser.add_argument("--batches", type=int, default=50, help=f"of {BATCH} cut-outs (default %(default)s)")
+    parser.add_argument(
+        "--batches", type=int, default=50, help=f"number of batches of {BATCH} crops (default %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     try:
-        network = between(options.first, options.second, options.at)
+        network = interpolated(options.first, options.second, options.at)
         batches = Batches(options.crops, CROP_PX, BATCH, options.seed)
     except (RecordError, FileNotFoundError, ValueError) as error:
         raise SystemExit(str(error)) from None

@@ -31,8 +31,8 @@ BETAS = 0.9, 0.99  # a point that is met for the first time then moves by the ra
 
 @dataclass(frozen=True)
 class Rates:
-    """Learning rates of Adam for the constant terms (`mean`) and the linear terms (`slope`) of descriptors. Features have
-    the range of colours, 0..1."""
+    """Learning rates of Adam: for the constant terms (`mean`) and the linear terms (`slope`) of descriptors, whose
+    features are in 0..1."""
 
     mean: float = 1e-2
     slope: float = 3e-4

@@ -1,8 +1,8 @@
-"""Made heads as triangles with what colours them, from one small file, by processes beside the training.
+"""Generates synthetic heads as triangles with their colours from one small file, in processes beside the training.
 
-The file (`export.heads.encoder_training.pack`) has the shapes of the training heads, as sums of a few bases, and the skin. Here each
-of them gets hair, tones and cameras anew whenever it is drawn. It takes numpy and scipy alone: what is inside other
-parts is left in: it is not visible.
+The file (`export.heads.encoder_training.pack`) has the shapes of the training heads, as sums of a few bases, and the
+skin. Each time a head is used, it gets other hair, tones and cameras. This takes numpy and scipy alone. Surfaces inside
+other parts stay in the mesh, because they are not visible.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Trains the encoder of heads for a given time on pictures that are drawn while it learns, and on real faces.
 
     python -m export.heads.encoder_training.pack heads.pack
-    python -m export.heads.encoder_training.train heads.pack --seconds 520 --out .data/runs/heads-encoder-gpu
+    python -m export.heads.encoder_training.train heads.pack --seconds 520 --out .data/runs/heads-encoder
 
 It draws, crops and learns on the graphics processor where there is one, else on the processor, with small batches, to
 try it out. Processes beside it make heads. Learning rate and end are by time. Writes weights.pt (the mean of the
@@ -225,7 +225,7 @@ def main() -> None:
         type=Path,
         help="initial trunk and neck, such as export/weights/densepose-b.pt, in place of --start",
     )
-    parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder-gpu"))
+    parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-encoder"))
     parser.add_argument("--seconds", type=float, default=520, help="from start to end, all told")
     parser.add_argument("--until", type=float, metavar="TIME", help="of the end, Unix time, instead of --seconds")
     parser.add_argument("--rate", type=float, default=2e-3)

@@ -14,7 +14,7 @@ from export.edges.config import EPS_R, SIZES, NetworkConfig
 from export.edges.data import Batches
 from export.edges.export_onnx import BundleInfo, export
 from export.edges.graph_field import field_of_planes, slopes_of
-from export.edges.interpolate_weights import between, measure_statistics
+from export.edges.interpolate_weights import interpolated, measure_statistics
 from export.edges.losses import FieldTarget, LossWeights, bin_centres, decoded, field_terms, histogram_target
 from export.edges.network import EdgeNetwork, PublishedNetwork, Residual
 from export.edges.validation import field_of
@@ -161,10 +161,10 @@ def test_a_network_between_two_is_either_at_its_ends_and_has_statistics_of_its_o
         torch.nn.init.normal_(parameter, std=0.3)
     save_network(second, deeper, tmp_path / "second.pt")
     planes = torch.rand(1, 12, 32, 32)
-    at_ends = [between(tmp_path / "first.pt", tmp_path / "second.pt", at)(planes) for at in (0, 1)]
+    at_ends = [interpolated(tmp_path / "first.pt", tmp_path / "second.pt", at)(planes) for at in (0, 1)]
     torch.testing.assert_close(at_ends[0], first.eval()(planes))
     torch.testing.assert_close(at_ends[1], second.eval()(planes))
-    middle = between(tmp_path / "first.pt", tmp_path / "second.pt", 0.5)
+    middle = interpolated(tmp_path / "first.pt", tmp_path / "second.pt", 0.5)
     torch.testing.assert_close(middle.head.weight, (first.head.weight + second.head.weight) / 2)
     torch.testing.assert_close(middle.deep[0][0].first[0].weight, second.deep[0][0].first[0].weight)
     measure_statistics(middle, Batches(write_crops(tmp_path / "crops", 0, 8), 48, 4, seed=0), 3)

@@ -2,7 +2,7 @@
 
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
-`quantization/prediction.toml` lists the layers that stay float; `quantization/transformer.py` quantizes the transformer.
+`quantization/prediction.toml` lists layers that stay float; `quantization/transformer.py` quantizes the transformer.
 Afterwards, `python -m quantization.prediction_refiner` adds the refiner. The command prints sizes, the signal-to-noise
 ratio of each output, and the cost of int8 on frames of validation clips: the fraction of equal codes, the PSNR of
 reconstructed frames, and the transformer's bits a code.

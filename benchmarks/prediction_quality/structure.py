@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.concealment import FIRST_START, START_STEP
 from benchmarks.prediction_quality.dis import Dis
-from export.scenes.picture_quality import ssim
+from export.scenes.image_quality import ssim
 
 START_STEP_OF_SSIM = 2 * START_STEP  # SSIM takes longer than the predictions
 

@@ -144,7 +144,8 @@ def test_the_table_of_packages_has_no_circle():
 READERS = (
     "export.prediction.train_autoencoder", "export.prediction.codes", "export.prediction.train_transformer",
     "export.densepose.train", "export.densepose.export_onnx", "export.scenes.train", "export.teachers.shards",
-    "export.evaluation.__main__", "export.evaluation.gallery", "export.heads.train_prior", "export.heads.encoder_training.train",
+    "export.evaluation.__main__", "export.evaluation.gallery", "export.heads.train_prior",
+    "export.heads.encoder_training.train",
     "export.heads.export_onnx", "export.heads.bundle", "quantization.quantize", "quantization.choose",
     "quantization.report", "quantization.scenes", "quantization.heads",
 )  # fmt: skip

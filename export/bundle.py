@@ -22,7 +22,7 @@ Signature = Mapping[str, Mapping[str, Sequence[int | str]]]
 
 @dataclass(frozen=True)
 class BundleInfo:
-    """What a bundle says about itself. measured: figures with their conditions, e.g. the error."""
+    """Metadata of a bundle. measured: metrics with their conditions, such as the error."""
 
     name: str
     precision: str  # "fp32" or "int8"
@@ -88,7 +88,7 @@ def read_manifest(folder: Path) -> dict:
 
 
 def signature_of(path: Path) -> Signature:
-    """Of an ONNX file."""
+    """Inputs and outputs of an ONNX file."""
     import onnx  # only writers need it
 
     graph = onnx.load(path).graph
@@ -99,7 +99,7 @@ def signature_of(path: Path) -> Signature:
 
 
 def signed(path: Path) -> dict[str, object]:
-    """What a manifest says of a file."""
+    """The entry of a file in a manifest."""
     data = path.read_bytes()
     return {"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)}
 

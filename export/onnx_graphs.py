@@ -1,4 +1,5 @@
-"""What all exports of ONNX graphs share: a graph written and checked, folded batch normalisation, layouts."""
+"""Functions that all exports of ONNX graphs share: writing and checking a graph, folding batch normalisation,
+layouts."""
 
 from __future__ import annotations
 

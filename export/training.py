@@ -1,4 +1,4 @@
-"""What the trainings have in common: length and learning rate, signals, checkpoints, averages, curves, processes.
+"""Parts that all trainings share: length and learning rate, signals, checkpoints, averages, curves, processes.
 
 Each system has a loop of its own (`export.densepose.train`, `export.scenes.train`). A run resumes to the same numbers
 because step k draws from the seed and k alone (`seed_step`), and its checkpoint holds everything else.

@@ -59,7 +59,7 @@ def prepared_graphs(source: Path, folder: Path) -> dict[str, onnx.ModelProto]:
 
 
 def media_samples(bundle: Bundle) -> dict[str, list[Sample]]:
-    """What each graph of an fp32 bundle sees on the pictures of this repository."""
+    """Inputs of each graph of a fp32 bundle for the images of this repository."""
     return collect(bundle, media_records(), people=2)
 
 

@@ -48,7 +48,7 @@ CANDIDATES = {
 
 
 def multiply_adds(module: nn.Module, *given: Tensor) -> int:
-    """Of all convolutions."""
+    """Multiply-adds of all convolutions."""
     total = 0
 
     def count(layer: nn.Module, _: tuple, output: Tensor) -> None:

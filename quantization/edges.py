@@ -29,7 +29,7 @@ from quantization.settings import EDGES, EdgeSettings, read_settings
 
 
 def samples(frames: Sequence[Frame]) -> list[Sample]:
-    """What the graph is given of each frame, through one sensor after the other."""
+    """Inputs of the graph for each frame, through one sensor after the other."""
     levels = list(LEVELS)
     return [
         {"slopes": slopes_of(frame_through(levels[k % len(levels)], frame), frame.focal_px)}

@@ -56,7 +56,7 @@ from quantization.samples import Sample
 from quantization.settings import HEADS, GraphSettings, HeadSettings, read_settings
 
 PARTS = {"template_point": POINT, "log_sigma": LOG_SIGMA, "matte": MATTE, "normal": NORMAL}
-# Of those of `figures`, in this order: template points in mm, matte, degrees.
+# Metrics of `figures` that are shown, in this order, with digits: template points in mm, matte, degrees.
 FIGURES = {"median_mm": 3, "point_mm": 3, "within_2_sigma": 4, "matte_iou": 4, "normal_deg": 2}
 
 
@@ -78,12 +78,12 @@ def spread(crops: Sequence[Crop], count: int) -> list[Crop]:
 
 
 def samples(crops: Sequence[Crop]) -> list[Sample]:
-    """What the graph is given of each crop."""
+    """Inputs of the graph for each crop."""
     return [{"image": crop.image[None].astype(np.float32)} for crop in crops]
 
 
 def cells_of(encoder: Path, given: Sequence[Sample]) -> Tensor:
-    """What an encoder's graph makes of them, [N, 48, 48, 8]."""
+    """Outputs of an encoder's graph, [N, 48, 48, 8]."""
     run = session(encoder)
     return torch.from_numpy(np.concatenate([run.run(["cells"], sample)[0] for sample in given]))
 
@@ -105,7 +105,7 @@ def parts_sqnr(expected: Tensor, found: Tensor) -> dict[str, float]:
 
 @torch.no_grad()
 def bases_cost(prior: Prior, bases: str, heads: HeadTensors, steps: int = 250) -> dict[str, dict[str, float]]:
-    """What stored bases lose on held-out heads, whose codes are fitted to their true points with the bases as they are.
+    """Error of stored bases on held-out heads, whose codes are fitted to their true points with exact bases.
 
     By "head" and "face", in mm: mean |distance| of true surface points to the fitted surface with bases in float16 and
     as `bases` says, and the mean difference of both fields there.

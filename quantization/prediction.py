@@ -49,13 +49,13 @@ def codes_of(features: np.ndarray, codes: FrameCodes) -> np.ndarray:
 
 
 def entries_of(numbers: np.ndarray, codes: FrameCodes) -> np.ndarray:
-    """What the decoder is given of codes [places, slices]: float32 [1, side, side, slices * width]."""
+    """Decoder input of codes [cells, slices]: float32 [1, side, side, slices * width]."""
     picked = np.stack([codes.entries[k][own] for k, own in enumerate(numbers.T)], 1)
     return np.ascontiguousarray(picked.reshape(1, codes.side, codes.side, -1))
 
 
 def samples(folder: Path, frames: np.ndarray, codes: FrameCodes) -> dict[str, list[Sample]]:
-    """What each graph of a fp32 bundle is given of frames."""
+    """Inputs of each graph of a fp32 bundle for frames."""
     encoder = session(folder / "encoder.onnx")
     images: list[Sample] = [{"image": frame[None].astype(np.float32)} for frame in frames]
     seen = [encoder.run(None, image)[0] for image in images]

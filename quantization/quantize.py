@@ -73,7 +73,7 @@ def quantize_graph(source: Path, target: Path, samples: list[Sample], settings: 
 
 
 def correct(prepared: Path, target: Path, samples: list[Sample], settings: GraphSettings) -> None:
-    """What makes the integers of a quantized graph better once scales are fixed."""
+    """Refinements of a quantized graph's integers once scales are fixed."""
     if settings.round_together:
         round_together(prepared, target, samples, SEVEN_BITS if settings.reduce_range else EIGHT_BITS)
     if settings.bias_correction:
@@ -183,15 +183,15 @@ def quantize_graphs(
 
 
 def as_measured(quality: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
-    """What `quantize_graphs` returns, for the manifest."""
+    """The result of `quantize_graphs` in the form of the manifest."""
     return {graph: {name: round(value, 1) for name, value in outputs.items()} for graph, outputs in quality.items()}
 
 
 def int8_info(
     name: str, source: Mapping[str, Any], quality: dict[str, dict[str, float]], **measured: object
 ) -> BundleInfo:
-    """What the int8 bundle of a fp32 one says of itself. source: manifest of that; quality: of `quantize_graphs`;
-    measured: further figures."""
+    """Metadata of the int8 bundle of a fp32 bundle. source: manifest of the fp32 bundle; quality: result of
+    `quantize_graphs`; measured: further metrics."""
     return BundleInfo(
         name=name,
         precision="int8",

@@ -1,4 +1,4 @@
-"""What the graphs of a bundle see on real images: for calibration and for measuring errors."""
+"""Inputs of a bundle's graphs on real images, for calibration and for measuring errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from quantization.settings import DENSEPOSE, DensePoseSettings
 PROPOSALS = 32
 CROP_SIDE = 192  # pixels of a person crop; the default of maq_densepose_config
 
-# What a graph is given, by the names of its inputs.
+# Inputs of a graph, by name.
 Sample = dict[str, np.ndarray]
 
 
@@ -68,7 +68,7 @@ def spread(records: list[Record], count: int) -> list[Record]:
 
 
 def calibration_records(settings: DensePoseSettings, rendered: Path, photos: Path | None) -> list[Record]:
-    """What sets the ranges: images of the shards in `rendered`, and of those in `photos` where they are given."""
+    """Calibration images: from the shards in `rendered`, and from `photos` where these are given."""
     records = spread(load_records(rendered), settings.calibration_images)
     if photos:
         records += spread(load_records(photos), settings.calibration_photos)

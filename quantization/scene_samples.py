@@ -61,7 +61,7 @@ def psnrs_db(networks: nn.Module, wanted: Sequence[Shot], what: str) -> list[flo
 
 @torch.no_grad()
 def collect(networks: BundleNetworks, wanted: Sequence[Shot]) -> dict[str, list[Sample]]:
-    """What each graph is given: a photo, and a picture's rasters, for each shot."""
+    """Inputs of each graph for each shot: a photo, and the rasters of an image."""
     samples: dict[str, list[Sample]] = {name: [] for name in GRAPHS}
     for shot in tqdm(wanted, desc="running the fp32 bundle", unit="picture", leave=False):
         options = Options(up=shot.capture.up)

@@ -120,7 +120,7 @@ def read_settings(path: Path, kind: type[Settings]) -> Settings:
 
 
 def _graph_settings(table: dict[str, object], where: str) -> GraphSettings:
-    """Of a table of such a file; `where` begins the sentence of a ValueError."""
+    """Reads the settings in a table of a file; `where` begins the sentence of a ValueError."""
     try:
         settings = GraphSettings(**{**table, "float_nodes": tuple(table.get("float_nodes", ()))})
     except TypeError as error:

@@ -88,7 +88,7 @@ def fix_sample_scales(folder: Path, clips: CodedClips, count: int) -> None:
 
 
 def runtime_of(folder: Path) -> tuple[GraphRuntime, TransformerShape]:
-    """Of a bundle: its graphs, and what they are given."""
+    """The runtime and the shape of a bundle's transformer."""
     tables = read_transformer_file(folder / TRANSFORMER)
     shape = TransformerShape(frames=tables.before, slices=len(tables.earlier), motion=tables.frames > tables.before)
     return GraphRuntime(folder, tables, prior_of(read_code_file(folder / CODES))), shape

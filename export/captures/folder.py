@@ -25,8 +25,8 @@ _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """What a cloud is made of: cameras, photos uint8 [H, W, 3], blue first, and depth maps, without those held out.
-    turn, scale, middle: from COLMAP's world to the capture's."""
+    """Input of a point cloud: cameras, photos uint8 [H, W, 3], blue first, and depth maps, without held-out photos.
+    turn, scale, middle: from COLMAP's world to the capture's world."""
 
     cameras: list[Camera]
     images: list[np.ndarray]
@@ -36,7 +36,7 @@ class Sources:
     middle: np.ndarray
 
     def write_clouds(self, folder: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
-        """Of the capture, and in COLMAP's own world."""
+        """Writes the cloud in the capture's world and in COLMAP's world."""
         write_ply(folder / "cloud.ply", xyz, rgb)
         in_model = ((xyz @ self.turn) / self.scale + self.middle).astype(np.float32)
         write_ply(folder / "model/fused.ply", in_model, rgb)
@@ -122,7 +122,8 @@ def write_depths(folder: Path, names: list[str], depths: list[np.ndarray]) -> tu
 
 
 def _camera(view) -> Camera:
-    """Of an image of a pycolmap.Reconstruction; pixels count from the first one's corner there."""
+    """The camera of an image of a pycolmap.Reconstruction, where pixel coordinates start at the corner of the first
+    pixel."""
     fx, fy, cx, cy = view.camera.params
     pose = view.cam_from_world()
     rotation = pose.rotation.matrix()

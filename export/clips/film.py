@@ -14,7 +14,7 @@ from export.clips.render import Labels
 
 
 class Filming(Protocol):
-    """What draws moments of its own kind: `render.Renderer`, `place_film.PlaceFilm`."""
+    """Renders moments of one kind: `render.Renderer`, `place_film.PlaceFilm`."""
 
     def colour(self, moment: Any, sizes: Sequence[tuple[int, int]]) -> list[np.ndarray]: ...
 

@@ -45,7 +45,7 @@ void main() {CUTTING
 
 @lru_cache(maxsize=1)
 def stock_of(split: str) -> Stock:
-    """What places of a split are made of, with its people; takes seconds, once a process."""
+    """The stock of environments and people of a split. Loading takes seconds, once a process."""
     return Stock(split)
 
 

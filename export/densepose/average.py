@@ -18,8 +18,8 @@ import torch
 
 
 def averaged(start: dict, trained: dict, fraction: float) -> dict:
-    """Of two weights files of `export.densepose.train`: as `trained`, whose "ema" is moved back towards that of `start`
-    (`fraction` 0: all the way, 1: not at all). Raises ValueError for networks of other shapes."""
+    """The contents of `trained`, with "ema" interpolated between `start` (`fraction` 0) and `trained` (1). Both are
+    weights files of `export.densepose.train`. Raises ValueError for networks of different shapes."""
     weights = dict(trained["ema"])
     for name, before in start["ema"].items():
         after = weights.get(name)

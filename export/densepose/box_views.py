@@ -44,7 +44,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class People:
-    """Those of a view: box float32 [n, 4], pixels; ignore bool [n], unsure ones."""
+    """People of a view: box float32 [n, 4], pixels; ignore bool [n]: uncertain people."""
 
     box: Tensor
     ignore: Tensor
@@ -138,7 +138,8 @@ def proposed_boxes(
 
 
 def matched(candidates: Tensor, truth: People) -> tuple[Tensor, Tensor, Tensor]:
-    """Of each box: whether it shows a person, whom, and whether both are known (bool, index, bool, [K])."""
+    """For each box: whether it shows a person, the index of that person, and whether both are known (bool, index, bool,
+    [K])."""
     if not len(truth.box):
         no_person = torch.zeros(len(candidates), dtype=torch.bool)
         return no_person, no_person.long(), ~no_person

@@ -34,7 +34,7 @@ TRAINING_DATA = (
 
 
 def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signature]:
-    """Of each graph, with `crops` also of `CROP_GRAPHS`."""
+    """Inputs and outputs of each graph, with `crops` also of `CROP_GRAPHS`."""
     width, anchors = network.width, len(network.aspect_ratios)
     sizes = {k: [f"height/{2**k}", f"width/{2**k}"] for k in LEVELS}
     # P6 is every second cell of P5, rounded up; that is no plain quotient of the input.

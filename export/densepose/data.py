@@ -95,7 +95,7 @@ class PersonCropping:
 
     def _turn(self, axis: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
         tilt = rotation(rng.uniform(-self.tilt_degrees, self.tilt_degrees))
-        # Whose axis nobody knows stands upright in a photograph, mostly; whose axis is seen from its end has none.
+        # In photographs, most people of unknown axis stand upright. An axis seen from its end has no direction.
         if axis is None or not np.hypot(*axis) > MIN_AXIS:
             return tilt
         return tilt @ turn_upright(axis)

@@ -238,7 +238,7 @@ class BiFPN(nn.Module):
         return self._top_down(taps)[0]
 
     def coarser_parameters(self) -> list[nn.Parameter]:
-        """Those that P2 does not depend on."""
+        """Modules that P2 does not depend on."""
         names = ("o3", "o4", "o5")
         return [p for n in names for part in (self.fuse, self.conv, self.down) for p in part[n].parameters()]
 
@@ -376,7 +376,7 @@ class DenseHead(nn.Module):
                     nn.init.zeros_(module.bias)
 
     def surface(self, rois: Tensor) -> Tensor:
-        """What the four predictors see, [P, C, 32, 32]."""
+        """Input of the four predictors, [P, C, 32, 32]."""
         return self.body(self.aspp(rois))
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -412,5 +412,5 @@ class MobileParsingRCNN(nn.Module):
         return self.neck.finest(self.backbone(image))
 
     def box_parameters(self) -> list[nn.Parameter]:
-        """Those that only boxes are found by."""
+        """Modules that only box detection uses."""
         return [*self.neck.coarser_parameters(), *self.rpn.parameters(), *self.box_head.parameters()]

@@ -1,4 +1,4 @@
-"""What the network is asked for: RPN and box head samples, dense labels on the RoI grid."""
+"""Training targets of the network: RPN and box head samples, dense labels on the RoI grid."""
 
 from __future__ import annotations
 
@@ -159,12 +159,12 @@ def pooled(
 
 
 def mean_evidence(evidence: Tensor, boxes: Tensor) -> Tensor:
-    """Of one picture's `PersonEvidence` [1, 1, h, w], the mean over each box, [R]."""
+    """Means of one image's person-logit map (`PersonEvidence`, [1, 1, h, w]) over each box, [R]."""
     return align_rois(evidence[0], boxes / PersonEvidence.STRIDE, 1).flatten()
 
 
 def align_rois(features: Tensor, boxes: Tensor, pool: int) -> Tensor:
-    """What torchvision's roi_align (aligned, sampling_ratio 0) gives for one image, by two matrix products.
+    """RoIAlign of one image by two matrix products; equals torchvision's roi_align (aligned, sampling_ratio 0).
 
     features: [C, h, w]; boxes: [R, 4] in cells. Returns [R, C, pool, pool]. A mean of bilinear samples on a
     lattice is linear along each axis apart; torchvision takes two to eight times as long backwards, where it

@@ -194,7 +194,7 @@ class Run:
         self.ema.net.load_state_dict(self.trained.state_dict())
 
     def _parts(self) -> dict[str, nn.Module | torch.optim.Optimizer]:
-        """What has a state, by its name in the checkpoint."""
+        """Objects with a state, by name in the checkpoint."""
         return {
             "net": self.net,
             "pixel_head": self.pixel_head,
@@ -204,7 +204,8 @@ class Run:
         }
 
     def parameters_of(self, stage: Stage, boxes: bool) -> list[nn.Parameter]:
-        """What a step of the stage trains. The rest must keep no gradient, else weight decay would wear it down."""
+        """Parameters that a step of the stage trains. Other parameters must have no gradient, or weight decay would
+        change them."""
         if stage.surface_only:
             used = nn.ModuleList([self.net.backbone, self.net.neck, self.pixel_head]).parameters()
             left_out = set()
@@ -221,7 +222,7 @@ class Run:
         kind = {"width": network.width, "backbone": network.backbone, "axis": network.axis, "frozen": self.frozen}
         for path in (self.checkpoint, self.steady) if keep else (self.checkpoint,):
             save_atomically({**state, **progress, **kind}, path)
-        # What is shipped, and what another run may start from: the averaged weights, in half precision.
+        # The averaged weights in half precision are shipped, and another run may start from them.
         half = {k: v.half() if v.is_floating_point() else v for k, v in state["ema"].items()}
         torch.save({"ema": half, **kind}, self.config.out / "weights.pt")
         write_log(self.log, self.config.out, FIGURES, against="images", label="validation")

@@ -50,9 +50,9 @@ DECAY = 1e-2  # of weights
 
 @dataclass(frozen=True)
 class View:
-    """Of a picture: the backbone's maps of strides 16 and 32, float16; boxes [R, 4], pixels; logit [R]: what the box
-    head gives each for a person; person: bool [R], on somebody whom labels are sure of; keeps: whether people may be in
-    the picture."""
+    """An image: the backbone's maps of strides 16 and 32, float16; boxes [R, 4], pixels; logit [R]: the box head's
+    logit of a person; person: bool [R], whether the box is on a person whose label is certain; keeps: whether the image
+    may show people."""
 
     fine: Tensor
     coarse: Tensor
@@ -79,7 +79,8 @@ def view(net: MobileParsingRCNN, image: Tensor, people: People, keeps: bool) -> 
 
 
 def views(net: MobileParsingRCNN, kinds: list[tuple[list[Picture], float]], count: int, seed: int) -> list[View]:
-    """Of `count` augmented pictures, those with boxes. kinds: pictures, how often they are drawn (fractions of 1)."""
+    """Augments `count` images and returns those with boxes. kinds: images and their share of samples (fractions of
+    1)."""
     seen = (
         view(net, image, people, keeps=len(picture.box) > 0 or not picture.complete)
         for picture, image, people in drawn_views(kinds, count, seed)

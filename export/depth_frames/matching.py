@@ -43,7 +43,7 @@ def depth_of(pair: Rectified, max_px: int) -> np.ndarray:
     border = (0, 0, max_px, 0)
     left, right = (cv2.copyMakeBorder(p, *border, cv2.BORDER_REPLICATE) for p in (pair.left, pair.right))
     found = matcher.compute(left, right)[:, border[2] :].astype(np.float32) / 16
-    # What the rectified pictures' principal points differ by is no disparity.
+    # The difference of the rectified images' principal points is no disparity.
     apart = found - (pair.cx_px - pair.right_cx_px)
     seen = (found > 0) & (apart > 0.5)
     return np.where(seen, pair.focal_px * pair.baseline / np.where(seen, apart, 1), 0).astype(np.float32)

@@ -14,7 +14,7 @@ TRAINING_DATA = (sources.RENDERED_SOLIDS.used_for("training, calibration"),)
 
 
 def signature(config: NetworkConfig) -> dict[str, dict[str, list[int | str]]]:
-    """Of the graph: height and width are open, halves of the frame's."""
+    """Inputs and outputs of the graph. Height and width are open, half of the frame's."""
     sides = [1, "height", "width"]
     return {
         "inputs": {"slopes": [*sides, INPUT_PLANES * FOLD**2]},

@@ -1,4 +1,4 @@
-"""What training and validation read: crops and frames of rendered solids, seen through a model of a depth camera."""
+"""Data of training and validation: crops and frames of rendered solids, seen through a model of a depth camera."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def read_frames(folder: Path, width_px: int | None = None, limit: int | None = N
 
 
 def seen_by(sensor: Sensor, depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.ndarray:
-    """What a sensor reports of exact depth: float32 [H, W]."""
+    """Depth with the errors of a sensor: float32 [H, W]."""
     return np.nan_to_num(sensor(depth, focal_px, rng), nan=0, posinf=0, neginf=0).astype(np.float32)
 
 
@@ -77,7 +77,7 @@ class Batches:
         self._pass, self._order = -1, np.empty(0, int)
 
     def index(self, number: int) -> int:
-        """Of the crop that is drawn as the `number`-th."""
+        """Index of the crop of sample `number`."""
         turn, at = divmod(number, len(self.records))
         if turn != self._pass:
             self._pass = turn

@@ -1,4 +1,4 @@
-"""What the network reads of a depth frame: slopes of inverse depth, and what is known. The reference for the C++.
+"""Input of the network from a depth frame: slopes of inverse depth and a mask of known pixels. Reference for the C++.
 
 A plane's inverse depth is linear in pixels, so a crease is a step of the slope whichever way the plane leans. Depth
 itself in 8 bits would have no edge left: 4 m in 256 steps are 16 mm.

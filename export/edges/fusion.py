@@ -130,8 +130,8 @@ def _middle(values: Sequence[float]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """What each view says of each target: distance and spread [V, N] in metres, NaN where it did not see it. Beyond FAR
-    of its own reach the distance is EPS_R of the target."""
+    """Predictions of each view for each target: distance and expected error [V, N] in metres, NaN where the view did
+    not see the target. Distances beyond FAR of the view's reach become EPS_R of the target."""
 
     distance: np.ndarray
     spread: np.ndarray

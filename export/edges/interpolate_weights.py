@@ -66,9 +66,7 @@ def main() -> None:
     parser.add_argument("second", type=Path)
     parser.add_argument("--at", type=float, required=True, help="0: the first network, 1: the second")
     parser.add_argument("--crops", type=Path, required=True, help="shards, or a file of export.solids.compact")
-    parser.add_argument(
-        "--batches", type=int, default=50, help=f"batches of {BATCH} crops (default %(default)s)"
-    )
+    parser.add_argument("--batches", type=int, default=50, help=f"batches of {BATCH} crops (default %(default)s)")
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()

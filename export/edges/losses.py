@@ -1,4 +1,4 @@
-"""What becomes small: the distance's error, its own idea of it, and the kind of edge.
+"""Losses of the edge network: error of the distance, its predicted error, and the kind of edge.
 
 The paper's histogram loss (arXiv 2011.15081, section 4.3 of its code's description) stands beside L1, L2 and a mixture
 of both on one distance a pixel; docs/research/edges.md has the comparison.

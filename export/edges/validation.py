@@ -22,7 +22,7 @@ Field = Callable[[np.ndarray, float], np.ndarray]  # depth [H, W] in metres, foc
 
 
 def frame_through(level: str, frame: Frame) -> np.ndarray:
-    """What the sensor of a level reports of a frame; the same each time."""
+    """A frame with the errors of a level's sensor; the same each time."""
     rng = np.random.default_rng([crc32(level.encode()), frame.number])
     return seen_by(LEVELS[level], frame.depth, frame.focal_px, rng)
 
@@ -65,7 +65,7 @@ def field_picture(distance: np.ndarray) -> np.ndarray:
 
 
 def slope_picture(depth: np.ndarray, focal_px: float) -> np.ndarray:
-    """What the network reads, as colours; unknown is black: uint8 [H, W, 3], RGB."""
+    """The network's input as colours; unknown pixels are black: uint8 [H, W, 3], RGB."""
     planes = slopes(torch.from_numpy(depth)[None], torch.full((1, 2), focal_px))[0].numpy()
     picture = np.stack([planes[0], planes[1], np.zeros_like(planes[0])], -1) * 127 + 128
     return (picture * planes[2][..., None]).astype(np.uint8)

@@ -146,7 +146,7 @@ class CApiBackend:
 
 
 def prediction_of(result: DensePoseResult) -> Prediction:
-    """What libmaquette found, in the form that all backends share."""
+    """The result of libmaquette in the form that all backends share."""
     box = np.array([person.box_px for person in result.people], np.float32).reshape(-1, 4)
     score = np.array([person.score for person in result.people], np.float32)
     return Prediction(box, score, np.stack([result.part, result.u, result.v], -1), result.person)

@@ -10,8 +10,8 @@ import numpy as np
 from export.evaluation.people import PersonRecord
 from export.evaluation.surface_accuracy import fraction
 
-# What people are told apart by, the group's name, and who belongs to it. A person about whom something is not known
-# (NaN) belongs to no group of that kind.
+# Criteria, names of groups, and their conditions. A person with an unknown value (NaN) belongs to no group of that
+# criterion.
 GROUPS: tuple[tuple[str, str, Callable[[PersonRecord], bool]], ...] = (
     ("size", "box lower than 64 px", lambda p: p.height_px < 64),
     ("size", "64 to 128 px", lambda p: 64 <= p.height_px <= 128),
@@ -67,7 +67,7 @@ def part_accuracy(people: list[PersonRecord]) -> float:
 
 
 def left_right(people: list[PersonRecord]) -> float:
-    """Of the limb pixels (or landmarks) painted as a limb, the fraction with the right side."""
+    """Fraction with the right side among limb pixels (or landmarks) that are labelled as a limb."""
     return fraction(sum(p.same_side for p in people), sum(p.limb for p in people))
 
 

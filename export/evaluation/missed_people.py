@@ -1,4 +1,4 @@
-"""What better boxes would bring: parts of the detector are replaced by the truth, and people are counted again.
+"""Measures the gain from better boxes: replaces parts of the detector by the truth and counts people again.
 
     python -m export.evaluation.missed_people
     python -m export.evaluation.missed_people --photos .data/photos/fresh
@@ -85,7 +85,7 @@ def replaced(truth: Truth, what: frozenset[str]) -> Iterator[None]:
         logits, _ = graphs.box_head(tg.pooled(features, [truth.box], network, network.box_pool))
         said = (logits[:, 0] - logits[:, 1] + tg.mean_evidence(evidence, truth.box)).sigmoid()
         seen = said > threshold
-        # Of a person's boxes NMS keeps the best scored one.
+        # NMS keeps the best scored box of a person.
         found, scores = torch.cat([truth.box[seen], found]), torch.cat([said[seen], scores])
         kept = truth.nms(found, scores, config.box_nms_iou)
         return found[kept], scores[kept]

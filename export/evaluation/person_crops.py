@@ -1,4 +1,4 @@
-"""What a second pass over person crops gains: part accuracy and masks, person by person.
+"""Measures the gain of the crop pass: part accuracy and masks, person by person.
 
     python -m export.evaluation.person_crops --data .data/people-wide/val --crop-weights .data/runs/crops/weights.pt
 
@@ -37,8 +37,9 @@ MATCH_IOU = 0.5
 
 @dataclass(frozen=True)
 class Score:
-    """Of one person and way: pixels of the body, those with the right part, mask IoU, limb pixels painted as a limb and
-    those of them with the right side; axis_off: degrees between the axis used and the true one, NaN without one."""
+    """Counts of one person and method: pixels of the body, pixels with the right part, mask IoU, limb pixels labelled
+    as a limb, and limb pixels with the right side. axis_off: degrees between the used and the true axis, NaN
+    without."""
 
     pixels: int
     right: int

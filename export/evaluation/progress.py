@@ -87,7 +87,7 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--add", metavar="NAME", help="take the figures of --evaluation in, under this name")
     parser.add_argument("--hours", type=float, help="of training so far, runs that these weights descend from included")
-    parser.add_argument("--images", type=int, help="seen so far, likewise")
+    parser.add_argument("--images", type=int, help="images seen so far")
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")
     parser.add_argument("--progress", type=Path, default=Path("docs/research/progress.json"), metavar="JSON")
     parser.add_argument("--picture", type=Path, default=Path("docs/images/progress.png"), metavar="PNG")

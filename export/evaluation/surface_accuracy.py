@@ -101,7 +101,7 @@ class PixelAccuracy:
         return self._diagonal_over(self.confusion.sum(0))
 
     def fates(self) -> dict[str, float]:
-        """What people's pixels are painted with: fractions of all, by the names of `FATES`."""
+        """Labels of people's pixels: fractions of all, by the names of `FATES`."""
         total = self.confusion[1:].sum()
         return {name: fraction(self.confusion[1:][_FATE[1:] == k].sum(), total) for k, name in enumerate(FATES)}
 

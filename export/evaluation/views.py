@@ -56,7 +56,7 @@ class CalibratedCamera:
         return cv2.undistortPoints(points, self.intrinsics, self.distortion)[:, 0]
 
     def focal_px(self, shape: tuple[int, int]) -> float:
-        """Of a picture of that shape."""
+        """Focal length of an image of that shape."""
         return float(self.intrinsics[0, 0] * shape[1] / self.size_px[0])
 
 
@@ -178,7 +178,7 @@ def judge(
 
 
 def calibrated_cameras() -> list[CalibratedCamera]:
-    """Those of the package's take. Raises PackageError."""
+    """Views of the package's take. Raises PackageError."""
     with PackageReader(fetch(load_packages()[PACKAGE])) as reader:
         return read_cameras(reader.read(CALIBRATION).decode())
 

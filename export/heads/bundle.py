@@ -28,7 +28,7 @@ GRAPHS = ("encoder",)
 PRIOR, TEMPLATE = "prior.maqp", "template.maqt"
 CELL_CHANNELS = 8
 CROP_SIDES = 1.6  # side of the crop by the longer side of the head's box, hair included
-# What the encoder looks at a second time.
+# The crop of the encoder's second pass.
 FACE = {"center_dm": NOSE_TIP.tolist(), "radius_dm": FACE_RADIUS_DM, "crop_sides": FACE_SIDES}
 TRAINING_DATA = (
     sources.SYNTHETIC_HEADS.used_for("training, calibration"),

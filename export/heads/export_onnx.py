@@ -66,7 +66,7 @@ class EncoderGraph(nn.Module):
         super().__init__()
         net = simplified(encoder)
         self.backbone, self.neck = net.backbone, net.neck
-        # What is seen and where it is have convolutions of their own: in int8 they would share an unsigned scale.
+        # Features and positions have convolutions of their own: in int8 they would share an unsigned scale.
         first = net.head[0].conv
         self.first, self.first_place = (nn.Conv2d(n, WIDTH, 3, padding=1, bias=n == WIDTH) for n in (WIDTH, 2))
         self.first.weight.data, self.first.bias.data = first.weight.data[:, :WIDTH], first.bias.data

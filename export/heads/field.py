@@ -49,7 +49,7 @@ def geometry(shape: FieldShape, weights: Weights, points: Tensor) -> Tensor:
 
 
 def surface(shape: FieldShape, weights: Weights, points: Tensor, out: Tensor) -> tuple[Tensor, Tensor]:
-    """What `geometry` gave at points -> logits of RGB and template points (dm), [(H,) N, 3] each."""
+    """Features of `geometry` at points -> logits of RGB and template points (dm), [(H,) N, 3] each."""
     h = torch.cat([out, points], -1)
     for layer in range(shape.first_surface_layer, len(weights) - 1):
         h = _activation(_linear(h, weights[layer]), shape.smoothing)

@@ -60,12 +60,12 @@ class HeadPictures:
 
 
 def head_path(folder: Path, split: str, number: int) -> Path:
-    """Of head `number` of a split."""
+    """Path of head `number` of a split."""
     return folder / split / f"head-{number:05}.npz"
 
 
 def head_paths(folder: Path, split: str) -> list[Path]:
-    """Of all heads of a split that are there, in their order."""
+    """Paths of all existing heads of a split, in order."""
     return sorted((folder / split).glob("head-[0-9]*[0-9].npz"))
 
 

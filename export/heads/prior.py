@@ -1,4 +1,4 @@
-"""What is known of heads before one is seen, in numpy: the field's bases, anchors, cut plane, places.
+"""The prior of heads in numpy: the field's bases, anchors, clip plane, landmarks.
 
 The head frame: decimetres (dm), x to the person's left, y to the back, z up, the origin in the middle of the head.
 sdk/src/head/field/field_shape.h has the field's formulas. Codes are whitened: of a head that nothing is known of, each
@@ -16,7 +16,7 @@ MAX_OCTAVES, MAX_WIDTH, MAX_LAYERS, MAX_CODES = 8, 256, 8, 512
 MIN_ANCHORS, MAX_ANCHORS = 4, 16384
 MAX_PLACES, MAX_PLACE_NAME = 256, 64  # names in bytes
 MAX_EXTENT_DM = 8.0
-# What programs look for in `Prior.places`; others are allowed.
+# Landmarks that programs look for in `Prior.places`; others are allowed.
 PLACES = (
     "nose_tip", "nose_bridge", "chin", "crown", "pupil_left", "pupil_right", "temple_left", "temple_right",
     "ear_top_left", "ear_top_right", "ear_bottom_left", "ear_bottom_right",
@@ -92,7 +92,7 @@ class Prior:
     shape: FieldShape
     constant: list[Layer]  # of each layer: W0, or what all heads have
     shape_bases: list[Layer]  # of each personal geometry layer: what a unit of a code adds, [K, outputs, inputs]
-    colour_bases: list[Layer]  # of each personal surface layer likewise, [colour codes, outputs, inputs]
+    colour_bases: list[Layer]  # of each personal surface layer, [colour codes, outputs, inputs]
     sharpness: float  # s of the opacity along rays, 1/dm
     cut_point: np.ndarray  # [3], of the plane where a head ends, below the chin
     cut_normal: np.ndarray  # [3], of length 1, out of the head

@@ -48,7 +48,7 @@ HEAD = np.dtype(
 
 @dataclass(frozen=True)
 class BasisError:
-    """What storing the bases of a layer loses."""
+    """Error from storing the bases of a layer."""
 
     layer: int
     relative_rms: float  # of its weights and biases; 1: as large as they are
@@ -56,8 +56,8 @@ class BasisError:
 
 
 def prior_bytes(prior: Prior, bases: str = "int8", constant: str = "float16") -> bytes:
-    """The bytes of a file. bases: of FORMATS; constant: likewise, but not int8. Raises PriorError for a prior that the
-    SDK would refuse, and for numbers that such a format does not hold."""
+    """The bytes of a file. bases, constant: one of FORMATS each, constant not int8. Raises PriorError for a prior that
+    the SDK would refuse, and for numbers that such a format does not hold."""
     check_prior(prior)
     if bases not in FORMATS or constant not in FORMATS or constant == "int8":
         raise PriorError(f"Bases cannot be stored as {bases} and constants as {constant}.")
@@ -113,7 +113,7 @@ def read_prior(path: Path) -> Prior:
 
 
 def bases_errors(prior: Prior, bases: str = "int8") -> list[BasisError]:
-    """What storing them so loses, of each personal layer."""
+    """Error of each personal layer from this storage."""
     kept_prior = prior_from_bytes(prior_bytes(prior, bases))
     found = []
     geometry, surface = prior.shape.personal

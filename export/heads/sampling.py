@@ -1,6 +1,6 @@
-"""What made heads and pictures of them differ by beside the head's shape: tones, light, clothes, glasses, cameras.
+"""Samples properties of synthetic heads and their images beside shape: tones, light, clothes, glasses, cameras.
 
-It takes numpy alone, so that other renderers than Embree can draw from the same heads and cameras.
+This module takes numpy alone, so that other renderers than Embree can use the same heads and cameras.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def sample_lamps(rng: np.random.Generator) -> Lamps:
 
 @dataclass(frozen=True)
 class Extras:
-    """What a picture shows and the head does not have: clothes below it, glasses."""
+    """Clothes below the head and glasses, which an image shows and the head's surface does not include."""
 
     cloth: np.ndarray  # RGB
     collar: float  # dm: skin ends at this height of the template

@@ -26,7 +26,7 @@ _FOLDERS = ("head", "nose", "mouth", "eyes", "ears", "chin", "cheek", "forehead"
 _OPPOSITE = {
     "decr": "incr", "in": "out", "down": "up", "backward": "forward", "concave": "convex", "compress": "uncompress",
 }  # fmt: skip
-# What ages or turns the whole head belongs to other sliders.
+# Other sliders change age and turn the whole head.
 _LEFT_OUT = ("head-age", "neck-trans", "head-trans")
 
 
@@ -41,7 +41,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Identity:
-    """What makes a head: all of it drawn from one generator."""
+    """Parameters of a head, all sampled from one generator."""
 
     phenotype: Phenotype
     sliders: np.ndarray  # [S], -1..1

@@ -1,5 +1,5 @@
-"""What files of priors and heads have in common (sdk/src/head/files/stored_numbers.h): layers of the field in float32,
-float16 and int8."""
+"""Number formats that files of priors and heads share (sdk/src/head/files/stored_numbers.h): layers of the field in
+float32, float16 and int8."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHAPE = np.dtype(
 
 
 def shape_of(stored: np.ndarray) -> FieldShape:
-    """Of one SHAPE. Raises PriorError for sizes that the SDK does not take."""
+    """Reads one SHAPE. Raises PriorError for sizes that the SDK does not take."""
     shape = FieldShape(**{key: stored[key].item() for key in SHAPE.names})
     check_shape(shape)
     return shape

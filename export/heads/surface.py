@@ -49,7 +49,7 @@ class HeadMaker:
         self.caps = np.concatenate(caps)
 
     def _seen_from_outside(self) -> np.ndarray:
-        """Of the template's skin, all but what is inside of mouth and eye sockets."""
+        """Mask of the template's skin faces, without the inside of mouth and eye sockets."""
         s = self.shapes
         scene = EmbreeScene(robust=True)
         faces = np.concatenate([s.faces, s.eye_faces])

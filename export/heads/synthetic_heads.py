@@ -26,7 +26,7 @@ def make_maker() -> HeadMaker:
 
 
 def generator(split: str, number: int) -> np.random.Generator:
-    """Of head `number` of a split."""
+    """The random generator of head `number` of a split."""
     return np.random.default_rng([zlib.crc32(f"heads-1/{split}".encode()), number])
 
 

@@ -30,7 +30,7 @@ HEAD = np.dtype(
 
 
 class Kind(IntEnum):
-    """What a point of the template is."""
+    """Kind of a point of the template."""
 
     INSIDE = 0  # of the skin behind the surface: follows its neighbours
     SURFACE = 1

@@ -118,7 +118,7 @@ def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tenso
 
 @dataclass(frozen=True)
 class FitFigures:
-    """Of heads whose codes were fitted to their true points: mean distance of true points to the fitted surface, mm."""
+    """Mean distance of true points to the fitted surface, mm, of heads whose codes were fitted to their true points."""
 
     head_mm: float
     face_mm: float
@@ -155,7 +155,7 @@ def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tupl
 
 @torch.no_grad()
 def fit_figures(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> FitFigures:
-    """Of heads with these codes, beside the mean head."""
+    """Errors of heads with these codes, beside the error of the mean head."""
     before = _distance_mm(bases, data, torch.zeros_like(z), torch.zeros_like(c))
     after = _distance_mm(bases, data, z, c)
     weights = bases.combine(z, c)

@@ -1,4 +1,5 @@
-"""What a camera sees of a head: colour under light, mask, depth, normals and template points of each pixel (Embree)."""
+"""Renders a head by ray casting (Embree): colour under light, mask, depth, normals and template points of each
+pixel."""
 
 from __future__ import annotations
 
@@ -108,7 +109,7 @@ class HeadViews:
         )
 
     def seen(self, camera: Camera, lamps: Lamps) -> Seen:
-        """What `Scene.seen` gives."""
+        """The result of `Scene.seen`."""
         return self.scene.seen(camera, lamps)
 
     def _colours(self, place: Place) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a camera does to a picture: lens, motion, exposure, colour, sharpening, noise. Labels move with the pixels."""
+"""Camera artefacts of an image: lens, motion, exposure, colour, sharpening, noise. Labels move with the pixels."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class LabelLookup:
             place = (points - self._low) / CELL_M
             cell = np.clip(place.astype(int), 0, shape - 1)
             distance = np.linalg.norm(place - cell - 0.5, axis=1).astype(np.float32)
-            # Of the points in a cell the one nearest to its middle; written last, so sorted by falling distance.
+            # The point nearest to the middle of a cell is written last, because points are sorted by falling distance.
             order = np.argsort(-distance, kind="stable")
             cell, face, distance = tuple(cell[order].T), face[order], distance[order]
             closer = distance < nearest[cell]

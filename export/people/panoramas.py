@@ -43,12 +43,13 @@ class Panorama:
         )
 
     def exposure(self, brightness: float) -> float:
-        """What radiance is multiplied by so that somebody in this light is about so bright."""
+        """Factor of radiance that gives a person in this light about this brightness."""
         falling = (self.sky + self.ground) / 2 + 0.5 * self.lamps[0][1]
         return brightness / max(float(falling @ _LUMINANCE), 1e-6)
 
     def seen(self, camera: Camera, yaw: float, exposure: float) -> np.ndarray:
-        """What lies behind the people: float32 [H, W, 3] BGR, 0..255. yaw: radians that the place is turned by."""
+        """The background behind the people: float32 [H, W, 3] BGR, 0..255. yaw: rotation of the environment,
+        radians."""
         x = (np.arange(camera.width_px) + 0.5 - camera.width_px / 2) / camera.fx_px
         y = (np.arange(camera.height_px) + 0.5 - camera.height_px / 2) / camera.fx_px
         ray = np.stack([*np.meshgrid(x, y), np.ones((camera.height_px, camera.width_px))], -1)

@@ -166,7 +166,7 @@ def neighbour_shade(depth: np.ndarray, focal_px: float) -> np.ndarray:
         return np.zeros_like(depth)
     filled = np.where(seen, depth, depth[seen].max() + _OCCLUSION_RADIUS).astype(np.float32)
     sigma = np.clip(focal_px * _OCCLUSION_RADIUS / np.median(depth[seen]), 2, 25)
-    # What is smooth needs few pixels: the mean of the neighbourhood is taken at a quarter of the size.
+    # A smooth image needs few pixels: the mean of the neighbourhood is computed at a quarter of the size.
     small = cv2.resize(filled, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
     around = cv2.resize(cv2.GaussianBlur(small, (0, 0), float(sigma) / 4), filled.shape[::-1])
     # A neighbour far in front of a surface does not touch it: without this, people would have dark outlines.
@@ -297,7 +297,7 @@ class Renderer:
         radius = min(float(np.linalg.norm(points - centre, axis=1).max()) + 0.5, _SHADOW_RADIUS)
         side = np.cross(towards, [0.31, 0.17, 0.93])
         side /= np.linalg.norm(side)
-        # What casts a shadow may stand well in front of those whom it falls on.
+        # An object that casts a shadow may stand far in front of the people in its shadow.
         axes = np.stack([side, np.cross(towards, side), -towards / 3]) / radius
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = axes, -axes @ centre

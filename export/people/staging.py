@@ -26,7 +26,7 @@ _MIN_DEPTH = 0.9  # metres from the camera to a person who is not framed
 
 @dataclass
 class Stage:
-    """What is to be drawn. `indoors`: the props have a floor; `roll_degrees`: the camera's tilt, if it has one."""
+    """Content of an image. `indoors`: the props have a floor; `roll_degrees`: the camera's tilt, if it has one."""
 
     people: list[Person]
     props: list[Prop]

@@ -1,4 +1,4 @@
-"""What a rendered person wears: garments cut from the helper meshes, fabrics, skin tones, hair.
+"""Clothes of rendered people: garments cut from the helper meshes, fabrics, skin tones, hair.
 
 The tights, skirt and hair helpers of the base mesh are skinned like the body; a garment is a choice of
 their triangles, pushed outwards along the normals. Every corner of a garment carries the body point nearest

@@ -56,7 +56,7 @@ def split_of(family: str) -> str:
 
 
 def family_of(name: str) -> str:
-    """What variants of one thing share: `grass_01`, `grass_02b` and `Grass` are all `grass`."""
+    """Common name of variants of one object: `grass_01`, `grass_02b` and `Grass` are all `grass`."""
     stem = PurePosixPath(name).stem.lower()
     return re.sub(r"([ _-]+(\d+[a-z]?|[a-z]|red|wet|dry|aut)|\d+[ _-]*)*$", "", stem) or stem
 

@@ -12,8 +12,8 @@ from export.camera import Camera
 
 @dataclass(frozen=True)
 class Lens:
-    """What the cameras of a place have in common: size in pixels, field of view of the longer side, offset of the
-    principal point from the middle in pixels."""
+    """Properties that the cameras of an environment share: size in pixels, field of view of the longer side, offset of
+    the principal point from the middle in pixels."""
 
     width: int
     height: int

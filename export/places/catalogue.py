@@ -1,4 +1,4 @@
-"""What places are furnished with: models by kind and split, tiles, photographs, panoramas, each with its licence."""
+"""Stock of environments: models by kind and split, tiles, photographs, panoramas, each with its licence."""
 
 from __future__ import annotations
 
@@ -193,5 +193,5 @@ def _photo(file: Path) -> np.ndarray:
 
 
 def people_assets() -> list[Asset]:
-    """What dressed people come from."""
+    """Packages of dressed people."""
     return [Asset(f"people: {p.used_for}", p.name, p.version, p.licence) for p in assets.PACKAGES]

@@ -21,7 +21,7 @@ DRAWN = Asset("textures and pictures", "maquette", "0.1.0", "CC0-1.0", "drawn by
 
 @dataclass(eq=False)
 class FreeStock:
-    """What `catalogue.Stock` has, without tiles, photographs, panoramas and people of packages."""
+    """A stock like `catalogue.Stock`, without tiles, photographs, panoramas and people of packages."""
 
     split: str
     people: None = None

@@ -11,7 +11,7 @@ from export.camera import Camera
 
 @dataclass(frozen=True)
 class CloudFaults:
-    """What is wrong with a cloud. All zero: exact, each point is what the centre of some pixel sees.
+    """Errors of a point cloud. All zero: exact, each point lies on the ray through the centre of some pixel.
 
     points: how many at most. noise: standard deviation along the ray, as a share of the depth. drift: the same for
     whole views (a depth camera that is wrong by a factor). missing: share of the points that balls cut out hold.
@@ -74,7 +74,7 @@ class CloudMaker:
         if not len(x):
             return
         z = depth[y, x].astype(np.float64)
-        # Of a surface twice as far, or seen aslant, a pixel sees more: its points must be more likely.
+        # A pixel covers more of a surface that is farther away or oblique: points there must be more likely.
         weight = (z**2 / np.maximum(slant[y, x], 0.1)) ** faults.spread
         count = min(-(-self.faults.points * 3 // (2 * self.views)), len(x))
         if count < len(x):

@@ -78,7 +78,7 @@ def _from_lamp(at: np.ndarray, towards: np.ndarray, degrees: float = 150.0) -> n
 
 
 def _packed(part: Part) -> np.ndarray:
-    """What the buffer of a part holds: float32 [F, 3, 9]."""
+    """The vertex buffer of a part: float32 [F, 3, 9]."""
     cut = np.ones(part.corners.shape[:2], np.float32) if part.cut is None else part.cut
     return np.concatenate([part.corners, part.normals, part.uv, cut[..., None]], 2).astype(np.float32)
 
@@ -192,7 +192,7 @@ class Renderer:
         return [d for d in self.drawn if d.part.shades and d.part.material.opacity >= 1]
 
     def _place_lights(self) -> None:
-        """What the key light and light from all over the sky see of the place, and depth maps for it."""
+        """Views of the environment from the key light and from directions all over the sky, and their depth maps."""
         casting = self._casting()
         points = np.concatenate([d.part.corners.reshape(-1, 3) for d in casting] or [np.zeros((1, 3))])
         low, high = points.min(0).astype(np.float64), points.max(0).astype(np.float64)

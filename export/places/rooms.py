@@ -22,7 +22,7 @@ _MARGIN = 0.3  # metres between cameras and walls
 
 @dataclass
 class Staged:
-    """What a recipe makes. near: metres before which cameras see nothing."""
+    """The result of a recipe. near: metres before which cameras see nothing."""
 
     kind: str
     parts: list[Part]

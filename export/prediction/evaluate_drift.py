@@ -98,7 +98,7 @@ class Roll:
 
 @dataclass(frozen=True)
 class State:
-    """Of a frame, COLUMNS; bits of a true one: nan."""
+    """COLUMNS of a frame; bits of a true frame: nan."""
 
     bits: float
     codes: float

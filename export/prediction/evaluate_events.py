@@ -74,7 +74,7 @@ def table_surprise(net: Autoencoder, table: CodeTable) -> Score:
 
 
 def stream_surprise(net: Autoencoder, table: CodeTable) -> Score:
-    """Bits a code by the table and by which codes stay in this stream, as the SDK has them."""
+    """The SDK's bits a code, by the table and by the codes that stay in this stream."""
     frequency_bits, after_bits = (-logs.numpy() / math.log(2) for logs in (table.frequency, table.after))
 
     def score(frames: np.ndarray, fps: float) -> np.ndarray:
@@ -103,7 +103,7 @@ def transformer_surprise(net: Autoencoder, transformer: LatentTransformer) -> Sc
 
 
 def levels(scores: np.ndarray, floor: float) -> np.ndarray:
-    """Of scores [n], from the BEFORE-th on: the logarithm of each over the median of those before, without its sign."""
+    """|log(score / median of the scores before)| of scores [n], from the BEFORE-th on."""
     medians = np.array([np.median(scores[k - BEFORE : k]) for k in range(BEFORE, len(scores))])
     return np.abs(np.log((scores[BEFORE:] + floor) / (medians + floor)))
 

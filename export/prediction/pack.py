@@ -42,7 +42,7 @@ def film(frames: np.ndarray, quality: int) -> bytes:
 
 
 def frames_of(content: bytes) -> np.ndarray:
-    """What `film` was given, but for what the quality loses."""
+    """The frames that `film` was given, with the loss of the compression."""
     with tempfile.NamedTemporaryFile(suffix=".mp4") as file:
         Path(file.name).write_bytes(content)
         capture, frames = cv2.VideoCapture(file.name), []

@@ -72,7 +72,7 @@ class Training:
 
 
 def add_arguments(parser: argparse.ArgumentParser, minutes: float, batch: int, rate: float, warm_up: int = 200) -> None:
-    """What all trainings ask for, with these defaults."""
+    """Adds the options of all trainings, with these defaults."""
     parser.add_argument("--minutes", type=float, default=minutes, help="of the whole schedule, over resumes")
     parser.add_argument("--steps", type=int, help="length of the schedule in steps instead of minutes")
     parser.add_argument("--batch", type=int, default=batch, help="frames a step (default %(default)s)")

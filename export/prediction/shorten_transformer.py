@@ -89,7 +89,7 @@ class Shortening(run.Training):
         self.whole = whole.eval()
 
     def loss(self, batch: Examples) -> tuple[Tensor, Tensor]:
-        """What to descend, and the bits by which what it says differs from what the whole one says."""
+        """The loss, and the divergence in bits from the predictions of the whole transformer."""
         prior = self.whole.prior_logits(batch.before)
         found = []
         for net in (self.whole, self.net):

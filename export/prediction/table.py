@@ -56,13 +56,13 @@ class CodeTable:
 
 
 def bits_by_frequency(table: CodeTable, codes: Tensor) -> Tensor:
-    """Of every frame but the first, a code: float32 [N, T - 1]."""
+    """Mean bits a code of every frame but the first: float32 [N, T - 1]."""
     of = [-table.frequency[k][codes[:, 1:, k].long()] for k in range(codes.shape[2])]
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
 
 
 def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
-    """Of every frame but the first, a code: float32 [N, T - 1]."""
+    """Mean bits a code of every frame but the first: float32 [N, T - 1]."""
     of = [-table.after[k][codes[:, :-1, k].long(), codes[:, 1:, k].long()] for k in range(codes.shape[2])]
     return torch.stack(of).mean((0, 3, 4)) / math.log(2)
 
@@ -70,10 +70,10 @@ def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
 def bits_of_stream(
     frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray, foreseen_bits: np.ndarray | None = None
 ) -> np.ndarray:
-    """Of one stream as the SDK has them (sdk/src/prediction/surprise/code_surprise.h): each code either stays or
-    follows the table, or foreseen_bits [T - 1, slices, 16, 16] where these are given, and each place learns which from
-    the frames so far: the posterior of two experts (Herbster and Warmuth, "Tracking the best expert", 1998). After a
-    cut, a frame with at least as many bits as its codes have by themselves, places have learnt nothing.
+    """The SDK's bits of one stream: each code either stays or follows the table, or foreseen_bits [T - 1, slices, 16,
+    16] where these are given. Each cell learns which of the two from the frames so far: the posterior of two experts
+    (Herbster and Warmuth, "Tracking the best expert", 1998). A cut is a frame with at least as many bits as its codes
+    have by frequency alone; after it, cells have learnt nothing.
 
     frequency_bits float32 [slices, K], after_bits [slices, K, K], codes [T, slices, 16, 16] -> float64 [T - 1, slices,
     16, 16].

@@ -45,7 +45,8 @@ class Training(run.Training):
 
 @torch.no_grad()
 def figures_of(net: Autoencoder, clips: Clips) -> tuple[dict[str, float], Tensor]:
-    """Of every fifth frame of held-out clips; and some true frames above what became of them, uint8 [128, W, 3]."""
+    """Metrics of every fifth frame of held-out clips, and some true frames above their reconstructions, uint8 [128, W,
+    3]."""
     frames = clips.frames[:, ::5].flatten(0, 1)
     made, codes = rebuilt(net, frames)
     chosen = torch.linspace(0, len(frames) - 1, min(12, len(frames))).long().to(frames.device)

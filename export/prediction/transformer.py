@@ -153,7 +153,7 @@ class LatentTransformer(nn.Module):
 
 
 def unreachable_parameters(shape: TransformerShape) -> int:
-    """Those that the published network has and that never see anything: four of seven taps in time of the context,
-    twenty of the 27 of the slice network's masked convolution. They are left out here; with them it has 49.9 M."""
+    """Number of the published network's parameters that never see any input: four of seven taps in time of the context,
+    and 20 of 27 taps of the slice network's masked convolution. This network omits them; with them it has 49.9 M."""
     context = 4 * shape.slices * shape.entries * shape.embedding
     return context + 20 * shape.embedding * shape.width

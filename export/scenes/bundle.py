@@ -16,8 +16,8 @@ TRUNK = sources.DETECTOR_TRUNK.used_for("first weights of the extractor's trunk;
 
 
 def training_data(places: Path) -> list[dict[str, str]]:
-    """What a manifest says of networks that were trained on the rendered places in a folder: everything that is in one
-    of them, by package, and where the trunk comes from. Raises ValueError for places that do not name their assets."""
+    """Training data of networks that were trained on the rendered environments in a folder, for a manifest: all assets
+    by package, and the source of the trunk. Raises ValueError for environments that do not name their assets."""
     packages: dict[tuple[str, str], set[str]] = {}
     count = 0
     for path in sorted(places.glob("*/transforms.json")):
@@ -39,7 +39,8 @@ def training_data(places: Path) -> list[dict[str, str]]:
 
 
 def identity(manifest: dict) -> str:
-    """Of the networks in a bundle, in hexadecimal: what scenes made with them keep (docs/formats.md)."""
+    """Identity of the networks in a bundle, in hexadecimal; scenes built with them store it
+    (docs/reference/formats.md)."""
     names = (*(manifest["graphs"][graph]["file"] for graph in GRAPHS), manifest["basis"]["file"])
     digests = "".join(manifest["files"][name]["sha256"] for name in names)
     return hashlib.sha256(digests.encode()).hexdigest()

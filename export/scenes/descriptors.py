@@ -35,7 +35,7 @@ class FittedDescriptors:
 
 @dataclass(frozen=True)
 class Moments:
-    """Of all points, after some views: K [P, 1], means [P, 8] and [P, 6], scatter [P, 6, 6] and [P, 6, 8]."""
+    """State of all points after some views: K [P, 1], means [P, 8] and [P, 6], scatter [P, 6, 6] and [P, 6, 8]."""
 
     views: Tensor
     mean_y: Tensor

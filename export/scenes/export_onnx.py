@@ -99,7 +99,7 @@ class RefinerGraph(nn.Module):
 
 
 def raster_shapes(refiner: Refiner, height: int, width: int) -> dict[str, list[int]]:
-    """What a refiner's graph is given for a picture of that size."""
+    """Input shapes of a refiner's graph for an image of that size."""
     is_light = isinstance(refiner, LightRefiner)
     rearranged, levels = (refiner.config.space_to_depth, refiner.config.levels) if is_light else (False, 5)
     shapes = {f"raster{k}": [1, height >> k, width >> k, RASTER] for k in range(levels)}

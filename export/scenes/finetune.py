@@ -70,8 +70,8 @@ def _first(channels_last: Tensor) -> Tensor:
 
 
 def rate_fraction(spent_s: float, saves_s: Sequence[float]) -> float:
-    """Of the learning rates, after so many seconds: from each save to the next it falls from 1 along a cosine, so that
-    every file is one that came to rest."""
+    """Fraction of the learning rates after `spent_s` seconds. From each save to the next it falls from 1 along a
+    cosine, so that training has converged at each save."""
     begin = 0.0
     for end in saves_s:
         if spent_s < end:

@@ -105,9 +105,9 @@ class FittedPoints:
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """What some photos see of a cloud, before any network. positions: float64 [P, 3], points that at least one sees.
-    images: for each photo RGB float32 [3, h, w], rotated upright. columns, rows: where the points are in it, [P].
-    seen: bool [P]. centres: of the cameras, [3]. background: the colour of what has no points, [3]."""
+    """Visibility of a cloud in some photos, before any network. positions: float64 [P, 3], points that at least one
+    photo shows. images: RGB float32 [3, h, w] of each photo, rotated upright. columns, rows: pixels of the points in
+    it, [P]. seen: bool [P]. centres: of the cameras, [3]. background: colour of areas without points, [3]."""
 
     positions: Tensor
     images: list[Tensor]
@@ -119,7 +119,7 @@ class Sources:
 
 
 def background_of(points: Tensor, seen: Sequence[Tensor], views: Sequence[View], options: Options) -> Tensor:
-    """What photos show where there is no point: the mean colour [3] of the blocks of BACKGROUND_PX x BACKGROUND_PX
+    """Background colour of photos: the mean colour [3] of the blocks of BACKGROUND_PX x BACKGROUND_PX
     pixels, counted from the first one, without a seen point; of all pixels where every block has one."""
     sums, counts = torch.zeros(2, 3, dtype=torch.float64), torch.zeros(2)
     for sees, view in zip(seen, views, strict=True):
@@ -175,7 +175,7 @@ def gathered(
                 sees = sees & (at >= 0) & (at <= window_px - 1)
         image = warped(view.image, view.camera, camera)
         sources.images.append(torch.from_numpy(image).permute(2, 0, 1))
-        # What is not seen may have no pixel at all; it counts for nothing, but must be a number.
+        # An unseen point may have no pixel at all; its value has no effect, but must be a number.
         sources.columns.append(torch.where(sees, columns, 0))
         sources.rows.append(torch.where(sees, rows, 0))
         sources.seen.append(sees)

@@ -11,7 +11,7 @@ C1, C2 = 0.01**2, 0.03**2
 
 
 def psnr_db(picture: np.ndarray, target: np.ndarray) -> float:
-    """Of RGB in 0..1, any equal shapes: -10 log10 of the mean squared difference."""
+    """PSNR of RGB in 0..1, any equal shapes: -10 log10 of the mean squared difference."""
     return float(-10 * np.log10(max(np.square(picture.astype(np.float64) - target).mean(), MIN_SQUARED_ERROR)))
 
 

@@ -1,4 +1,4 @@
-"""What training makes small: NPBG++ (arXiv 2203.13318), section 4."""
+"""Losses of the training: NPBG++ (arXiv 2203.13318), section 4."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What one step of training is given: a crop of a photo, the photos it is to be made from, and their cloud."""
+"""Input of a training step: a crop of a photo, the source photos, and their cloud."""
 
 from __future__ import annotations
 

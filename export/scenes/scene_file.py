@@ -79,12 +79,12 @@ class SceneFile:
 
     @property
     def up(self) -> tuple[float, float, float]:
-        """Of the world."""
+        """The upward direction of the world."""
         return tuple(float(x) for x in self.head["up"])
 
     @property
     def networks_sha256(self) -> str:
-        """Of the networks that the descriptors were made with (`identity` of export.scenes.bundle)."""
+        """Identity of the networks of the descriptors (`identity` of export.scenes.bundle)."""
         return self.head["networks_sha256"].tobytes().hex()
 
     def positions(self) -> np.ndarray:

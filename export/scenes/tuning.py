@@ -40,9 +40,9 @@ class Rates:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a camera shows of a scene, whatever its descriptors are. frame: the upright picture that is rendered,
-    rotated: whether the camera's own differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis: [V,
-    6]."""
+    """The points of a scene that a camera shows, independent of descriptors. frame: the upright image that is rendered,
+    rotated: whether the camera's own image differs. points: int64 [V], slots: of each level, as in `Pyramid`. basis:
+    [V, 6]."""
 
     camera: Camera
     frame: Camera
@@ -67,7 +67,7 @@ class TunedScene(nn.Module):
 
     @torch.no_grad()
     def shown(self, camera: Camera) -> Shown:
-        """What a camera of any size and roll shows."""
+        """The visible points of a camera of any size and roll."""
         up = np.asarray(self.options.up)
         frame = upright(camera, up, MULTIPLE)
         rotated = moves(camera, frame)
@@ -114,7 +114,7 @@ class TunedScene(nn.Module):
 
 
 def _rotated(picture: Tensor, camera: Camera, frame: Camera) -> Tensor:
-    """The frame's picture [1, 3, h, w] as the camera has it [1, 3, H, W]; bilinear, borders repeated."""
+    """The frame's image [1, 3, h, w] in the pixels of the camera [1, 3, H, W]; bilinear, borders repeated."""
     rows, columns = torch.meshgrid(torch.arange(camera.height_px), torch.arange(camera.width_px), indexing="ij")
     pixels = torch.stack([columns, rows, torch.ones_like(rows)], -1).double()
     at = pixels @ torch.from_numpy(between(camera, frame)).T

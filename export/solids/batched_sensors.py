@@ -245,7 +245,7 @@ class SensorDeck:
 
     @staticmethod
     def _group(sensor: Sensor) -> tuple[type | None, int]:
-        """What must be alike in frames that are computed together."""
+        """Properties that must be equal in frames that are computed together."""
         if sensor is clean:
             return None, 0
         return type(sensor), sensor.factor if isinstance(sensor, Phone) else 0
@@ -258,8 +258,8 @@ class SensorDeck:
 
     @torch.no_grad()
     def see(self, chosen: np.ndarray, depth: Tensor, focal_px: Tensor, draws: Draws | None = None) -> Tensor:
-        """What the sensors of these numbers report of exact depth [N, H, W], in metres, 0 where nothing is; focal_px:
-        [N]."""
+        """Depth that the sensors of these numbers report for exact depth [N, H, W], in metres, 0 where nothing is;
+        focal_px: [N]."""
         draws = draws or Draws(self.device)
         order = np.argsort(self._group_of[chosen], kind="stable")  # each group one piece
         back = self._moved(np.argsort(order))

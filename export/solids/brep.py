@@ -1,4 +1,4 @@
-"""What rendering and labels need of a shape, as arrays: triangles by face, edges with the normals on both sides.
+"""Arrays of a shape for rendering and labels: triangles by face, edges with the normals on both sides.
 
 Faces are numbered from 0. An edge is a line, an arc, or a polyline through points of its curve; where its faces meet at
 a varying angle (a cylinder through a cylinder) normals are known at each of its knots.

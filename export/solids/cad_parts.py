@@ -53,8 +53,8 @@ def part_names() -> list[str]:
 
 
 def unpacked(archive: Path, names: list[str], folder: Path) -> list[Path]:
-    """Those members in the folder, unpacked where they are missing: the archive holds 5.5 GB, which are read past and
-    never kept. Raises PackageError."""
+    """Paths of these members in the folder; unpacks missing ones. The archive of 5.5 GB is streamed and never stored.
+    Raises PackageError."""
     paths = {_INSIDE + name: folder / name.replace("/", "-") for name in names}
     missing = {member for member, path in paths.items() if not path.exists()}
     if missing:

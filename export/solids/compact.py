@@ -50,7 +50,8 @@ def _powers(height: int, width: int) -> np.ndarray:
 
 
 def _differences(plane: np.ndarray) -> np.ndarray:
-    """Of each number from what its left, upper and upper left neighbours let one expect, as numbers from 0 on."""
+    """Residual of each number against the prediction from its left, upper and upper left neighbours, mapped to
+    natural numbers."""
     off = np.diff(np.diff(plane, axis=-2, prepend=0), axis=-1, prepend=0)
     return (off << 1) ^ (off >> 63)
 

@@ -1,4 +1,4 @@
-"""What is stored of a seed: training crops about its curves, or whole views with the curves themselves."""
+"""Stored data of a seed: training crops around its curves, or whole views with the curves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What recipes share: random outlines, sizes, edges to round, patterns; and where a thing stands."""
+"""Random choices that recipes share: outlines, sizes, edges to round, patterns, and positions of objects."""
 
 from __future__ import annotations
 

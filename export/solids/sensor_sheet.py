@@ -1,4 +1,4 @@
-"""What the models of depth cameras make of one solid, and their noise against range beside published figures.
+"""Plots the output of the depth camera models for one solid, and their noise against range beside published values.
 
     python -m export.solids.sensor_sheet --data .data/solids/val --out docs/images
 

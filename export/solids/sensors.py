@@ -1,4 +1,4 @@
-"""What depth cameras make of exact depth: noise, steps, holes, and what is smeared across jumps.
+"""Models of depth cameras: noise, steps, holes, and flying pixels across depth jumps.
 
 A sensor takes exact depth (float [H, W], metres, 0 where nothing is) and the focal length in pixels and returns what
 the camera would report, float32, 0 where it reports nothing. Nothing else of the scene is asked for: slopes and

@@ -43,7 +43,7 @@ FIGURES = ("noise, px", "shared with the next pixel", "with the fourth", "fatten
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """What the left camera sees, float64 [H, W] metres; grey pictures uint8 [H, W] of both."""
+    """Depth of the left camera, float64 [H, W] metres; grey images uint8 [H, W] of both cameras."""
 
     depth: np.ndarray
     left: np.ndarray

@@ -20,8 +20,8 @@ class LostError(RuntimeError):
 
 
 def called(function: Callable[..., Value], *arguments, cpu_s: int) -> Value:
-    """What the function returns, or its exception; both can be pickled. Raises LostError. Call it from a process of one
-    thread."""
+    """Returns the function's result or raises its exception; both must be picklable. Raises LostError. Call it from a
+    process with one thread."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:

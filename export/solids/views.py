@@ -50,7 +50,7 @@ class Seen:
         self._nearest, self._farthest = (f(f(a[:, 2], b[:, 2]), c[:, 2]) for f in (np.minimum, np.maximum))
 
     def rendered(self, camera: Camera) -> View:
-        """What `camera`, which may frame other pixels than this one, sees."""
+        """The view of `camera`, which may frame other pixels than this one."""
         x = (np.arange(camera.width_px) - camera.cx_px) / camera.fx_px
         y = (np.arange(camera.height_px) - camera.cy_px) / camera.fy_px
         ray = np.ones((camera.height_px, camera.width_px, 3))

@@ -57,7 +57,7 @@ def mirrored_joint(name: str) -> str:
     return name[:-1] + {"L": "R", "R": "L"}[name[-1]] if "." in name else name
 
 
-# Landmarks that are joints: the bone whose head they are. Knuckles stand for fingers, as BlazePose has them.
+# Landmarks that are joints: the bone whose head they are. Knuckles stand for fingers, like in BlazePose.
 _LANDMARK_BONES = {
     "shoulder": "upperarm01", "elbow": "lowerarm01", "wrist": "wrist", "hip": "upperleg01", "knee": "lowerleg01",
     "ankle": "foot", "index finger": "finger2-1", "little finger": "finger5-1", "thumb": "finger1-2",

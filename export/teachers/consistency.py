@@ -1,5 +1,5 @@
-"""What a trained network itself says of people in photographs, seen large, upright and several times: labels for the
-same people turned, shrunk and blurred.
+"""Labels by consistency: answers of a trained network about people in photographs, seen large, upright and several
+times, as labels for the same people turned, shrunk and blurred.
 
 The teachers know a region here and there (`coarse.py`) and for the rest of a mask only that it is a person. Where
 weights that are asked several times agree with themselves, and with what the teachers leave possible, their answer

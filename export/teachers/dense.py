@@ -131,7 +131,7 @@ def judged(fit: Fit, target: Target, drawn: np.ndarray, point: np.ndarray, nose:
         for a in (target.mask, target.elsewhere)
     )
     body = drawn[..., 0] > 0
-    # What somebody or something stands before is not missing from the mask.
+    # Pixels hidden by an object or a person are not missing from the mask.
     hidden = elsewhere | ~np.concatenate([[True], fit.shown[_PART_JOINTS[1:]]])[drawn[..., 0]]
     counted = body & ~(hidden & ~mask)
     iou = float((counted & mask).sum() / max((counted | mask).sum(), 1))

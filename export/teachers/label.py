@@ -1,4 +1,4 @@
-"""What the teachers say about a photo: everybody's box and, where they agree with each other, landmarks and mask."""
+"""Labels of a photo by the teachers: boxes of all people and, where teachers agree, landmarks and mask."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said about one photo, kept as one file."""
+"""Labels of one photo, stored as one file."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def activation_errors(
     there = set(tensor_names(quantized))
     names = [n for n in tensor_names(reference) if n in pairs or n in there]
     names += [n for n in pairs if n not in names]  # numbers that activations are multiplied by
-    # What a node of the int8 graph sees under this name: the tensor behind its pair where it has one.
+    # The tensor that a node of the int8 graph reads under this name: the output of its QDQ pair, if any.
     seen = {name: pairs[name].after if name in pairs else name for name in names}
     expect, run = Activations(reference, names), Activations(quantized, list(seen.values()))
     here, gathered = ({name: Noise() for name in names} for _ in range(2))

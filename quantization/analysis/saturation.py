@@ -139,7 +139,7 @@ def with_bits(layer: Layer, reference: onnx.ModelProto, bits: int) -> Layer:
 
 
 def columns(layer: Layer, values: np.ndarray) -> list[np.ndarray]:
-    """What the layer multiplies, as uint8 [positions, reduction] for each of its groups; at most `ROWS` positions.
+    """Inputs of the layer's products, as uint8 [positions, reduction] for each of its groups; at most `ROWS` positions.
 
     values: its float input, [N, C, h, w] or [N, features].
     """

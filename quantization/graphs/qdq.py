@@ -1,4 +1,4 @@
-"""What a quantized (QDQ) graph holds: its weights and activations with their scales, matched to the float graph."""
+"""Weights and activations of a quantized (QDQ) graph with their scales, matched to the float graph."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEAVY = ("Conv", "ConvTranspose", "Gemm", "MatMul")
 class Weight:
     """A constant stored as integers. name: as in the float graph; output: what the int8 graph calls it where it is
     read. node: the first that reads it; slot: which of its inputs. stored: integers; scale: float32, one or one per
-    channel along `axis`; zero_point: likewise. expected: the float constant."""
+    channel along `axis`; zero_point: of the same shape. expected: the float constant."""
 
     name: str
     output: str

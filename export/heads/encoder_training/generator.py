@@ -48,7 +48,7 @@ class PackedHeads:
 
 @dataclass(frozen=True)
 class _Places:
-    """What `Barber` asks of shapes."""
+    """The attributes of shapes that `Barber` uses."""
 
     template: np.ndarray
     faces: np.ndarray
@@ -124,7 +124,7 @@ class HeadStream(IterableDataset):
         return np.concatenate([points, [points[loop].mean(0) for loop in self.packed.loops]])
 
     def meshes(self, numbers: np.ndarray, rng: np.random.Generator) -> Meshes:
-        """Those heads, with hair and all else drawn from `rng`."""
+        """Meshes of these heads; `rng` samples hair and all other properties."""
         columns: dict[str, list] = {name: [] for name in Meshes.__dataclass_fields__}
         start = 0
         for k, number in enumerate(numbers):

@@ -1,6 +1,6 @@
-"""What cameras do to pictures (`export.people.imaging.camera_faults`), to a whole batch at once in torch.
+"""Camera artefacts (`export.people.imaging.camera_faults`) for a whole batch at once in torch.
 
-Each fault strikes some crops of a batch; the others go through with strength 0. Low resolution is a blur and bilinear
+Each artefact affects some crops of a batch; the other crops get strength 0. Low resolution is a blur and bilinear
 interpolation between coarser pixels; compression works on the crop's own blocks.
 """
 

@@ -25,7 +25,7 @@ class Hits:
 
 
 def rasterized(corners: Tensor, nearness: Tensor, picture: Tensor, side: int, perspective: bool) -> Hits:
-    """What B square pictures of `side` pixels show.
+    """Rasterizes triangles into B square images of `side` pixels.
 
     corners float32 [F, 3, 2]: pixels of each triangle's corners. nearness [F, 3] > 0: larger is nearer, affine over the
     picture: 1 / depth in perspective, else any constant less the depth. picture int64 [F]. Triangles with a corner

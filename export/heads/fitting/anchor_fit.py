@@ -39,9 +39,9 @@ MAX_STEPS = 16
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Of one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] where they are seen, with the first
-    pixel's centre at (0, 0), and the sigma of these [N]. centre: the principal point. log_focal_sigma: 0 where the
-    focal length is known, else focal_px is the median."""
+    """Observations in one photo: template points [N, 3] dm, their sigma [N] dm, pixels [N, 2] where they are seen, with
+    the first pixel's centre at (0, 0), and the sigma of these [N]. centre: the principal point. log_focal_sigma: 0
+    where the focal length is known, else focal_px is the median."""
 
     template: np.ndarray
     sigma: np.ndarray
@@ -53,7 +53,7 @@ class Observations:
 
 
 def observations_of(photo: HeadPhoto) -> Observations:
-    """Of the cells that show the head: those of the closer look at the face, and of the first one around it."""
+    """Observations of the cells that show the head: from the face crop, and from the head crop around it."""
     first = shows_head(photo.cells)
     looks: list[tuple[Look, np.ndarray]] = [(photo, first)]
     if photo.face:
@@ -100,7 +100,7 @@ class AnchorPoints:
 
 
 class AnchorTerms:
-    """What the cells of one photo cost. Pixels are from the principal point."""
+    """Cost of the cells of one photo. Pixels count from the principal point."""
 
     def __init__(self, seen: Observations, points: AnchorPoints) -> None:
         keep = np.nonzero(points.distance(seen.template) <= MAX_ANCHOR_DM)[0]
@@ -199,7 +199,7 @@ class _Equations:
         return a, b
 
     def code_covariance(self, pose: ScaledPose, z: np.ndarray) -> np.ndarray:
-        """Of the codes, [K, K]."""
+        """Covariance of the codes, [K, K], at the minimum."""
         return np.linalg.inv(self._set_up(pose, z)[0])[UNKNOWNS:, UNKNOWNS:]
 
     def minimise(

@@ -14,8 +14,8 @@ MAX_SLOPE = 1.5  # of the distance, which steps along a ray count on
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """Of N rays: is_in_domain; distance [N]: of the point nearest to the head, 0 where it is met; begin and end [N]:
-    depths of what the ray passes on its way inwards. Not to be used where a ray is not in the domain."""
+    """Passages of N rays: is_in_domain; distance [N]: of the point nearest to the head, 0 for a hit; begin and end [N]:
+    depths of the section on the way inwards. Values of a ray outside the domain are undefined."""
 
     is_in_domain: np.ndarray
     distance: np.ndarray
@@ -43,8 +43,8 @@ class DistanceGrid:
         return map_coordinates(self.values, index[:, ::-1].T, order=1, mode="nearest")
 
     def passage(self, base: np.ndarray, direction: np.ndarray, first: float, enough_dm: float) -> Passage:
-        """Of rays base + depth * direction, [N, 3] each, depth > first. A passage begins `enough_dm` outside, or where
-        the domain does, and ends as far inside, or where the ray no longer comes nearer."""
+        """Passages of rays base + depth * direction, [N, 3] each, depth > first. A passage begins `enough_dm` outside,
+        or where the domain does, and ends as far inside, or where the ray no longer comes nearer."""
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (self.low - base) / direction, (self.high - base) / direction
         start, stop = np.maximum(np.minimum(a, b).max(1), first), np.minimum(np.maximum(a, b).min(1), 1e9)

@@ -162,11 +162,11 @@ class RayFit:
 
     @staticmethod
     def _ray_weight(level: RayLevel, count: int) -> float:
-        """What a ray's loss is worth where `count` of them stand for all pixels."""
+        """Weight of a ray's loss where `count` rays represent all pixels."""
         return RAY_WEIGHT * level.cells_per_ray * (len(level.fitted) + len(level.held_out)) / count if count else 0.0
 
     def _loss(self, rays: Rays, level: RayLevel, is_exact: bool) -> Tensor:
-        """Of the state, with a gradient by `change`."""
+        """Loss of the state, with a gradient by `change`."""
         by_shape, by_colour, by_pose = self.change
         shape, colour = self.now.shape.double() + by_shape, self.now.colour.double() + by_colour
         pose = self.now.pose.displaced(by_pose)

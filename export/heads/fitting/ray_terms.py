@@ -1,4 +1,4 @@
-"""What the rays of a photo say of a head: losses with gradients (sdk/src/head/fit/ray_terms, ray_losses, opacity).
+"""Losses of the rays of a photo, with gradients (sdk/src/head/fit/ray_terms, ray_losses, opacity).
 
 The matte is compared with the opacity (NeuS, arXiv 2106.10689, in its log form) of sections around where a ray goes in,
 or passes nearest. Template point and colour are those of the point where it goes in, which moves along the ray as the
@@ -49,7 +49,7 @@ def matte_loss(log_transmittance: Tensor, matte: Tensor) -> Tensor:
 
 
 def robust(square: Tensor) -> Tensor:
-    """Of squared sigmas (Geman-McClure)."""
+    """Robust loss of squared sigmas (Geman-McClure)."""
     return 0.5 * square / (1 + square / LIMIT)
 
 
@@ -92,7 +92,7 @@ class RayTerms:
         return DistanceGrid(*self.bounds, distance)
 
     def losses(self, weights: Weights, pose: ScaledPose, grid: DistanceGrid, rays: Rays) -> RayLosses:
-        """Of these rays, with gradients by the weights and the pose where those have them."""
+        """Losses of these rays, with gradients by the weights and the pose where these require them."""
         pixels = torch.from_numpy(rays.pixels.astype(np.float64))
         base, direction = pose.rays(pixels)
         first = 0.95 * pose.eye_depth()
@@ -139,7 +139,7 @@ class RayTerms:
         enters = (distances[:, :-1] > 0) & (distances[:, 1:] <= 0)
         k = enters.int().argmax(1)
         row = torch.arange(len(k))
-        # Of what lies behind the cut nothing is known.
+        # Nothing is known of the region behind the clip plane.
         hits = torch.nonzero(enters.any(1) & ~at_cut[row, k] & ~at_cut[row, k + 1])[:, 0]
         k, base, direction = k[hits], base[hits], direction[hits]
         outside, inside = depth[hits, k], depth[hits, k + 1]

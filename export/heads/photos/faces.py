@@ -181,7 +181,7 @@ def crop_face(
     matte = matte_of(face, pose, labels, image.shape[:2])
     square = square_of(pose, matte)
     rgb = square.cut(image, SIDE)[..., ::-1]
-    # What lies outside of the photo is grey in the crop and shows no head.
+    # The area outside of the photo is grey in the crop and shows no head.
     index = (np.arange(SIDE) + 0.5) / SIDE * square.size - square.size / 2
     x, y = np.round(square.centre[0] + index).astype(int), np.round(square.centre[1] + index).astype(int)
     inside_x, inside_y = (x >= 0) & (x < image.shape[1]), (y >= 0) & (y < image.shape[0])

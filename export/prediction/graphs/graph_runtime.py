@@ -1,5 +1,5 @@
-"""What the runtime does around the graphs of the transformer, in numpy: the reference for the C++. Look-ups,
-neighbours, the relative bias, kept keys and values; a frame at once, or place after place with the codes that a caller
+"""The runtime around the graphs of the transformer in numpy: the reference for the C++. It does look-ups, neighbours,
+the relative bias, and the cache of keys and values; for a frame at once, or cell after cell with codes that a caller
 chooses."""
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ class GraphRuntime:
         return self.tables.slice_rows[codes + first].sum(0)
 
     def logits(self, codes: np.ndarray) -> np.ndarray:
-        """Of each code of a frame given those before it: codes int64 [slices, 16, 16] -> [slices, 256, K]."""
+        """Logits of each code of a frame given the codes before it: codes int64 [slices, 16, 16] -> [slices, 256,
+        K]."""
         padded = np.pad(self.embedded(codes), ((2, 0), (1, 1), (0, 0)))
         near = np.concatenate(
             [padded[2 + y :, 1 + x :][:CODE_SIDE, :CODE_SIDE] for y, x in NEIGHBOURS], -1
@@ -82,7 +83,7 @@ class GraphRuntime:
             near = np.concatenate([embedded[2 + row + y, 1 + column + x] for y, x in NEIGHBOURS])
             caches = []
             for layer, bias in enumerate(self.bias):
-                # What is kept is seen before this place; this place sees itself.
+                # A cell sees the cached cells before it, and itself.
                 own = np.full((self.heads, 1, PLACES + 1), -np.inf, np.float32)
                 own[:, 0, :place], own[:, 0, PLACES] = bias[:, place, :place], bias[:, place, place]
                 caches += [keys[layer][None], values[layer][None], own]

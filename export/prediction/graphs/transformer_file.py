@@ -1,5 +1,5 @@
-"""Tables that a runtime needs beside the graphs of the transformer (.maqr, docs/reference/formats.md): the embedding
-row of each code, and the relative bias of the slice network."""
+"""Tables that a runtime looks up around the graphs of the transformer, in a file (.maqr, docs/reference/formats.md):
+embedding rows of codes, and the relative bias of the slice network."""
 
 from __future__ import annotations
 

@@ -41,13 +41,13 @@ class ForeseenClips:
 
 
 def squeezed(picture: np.ndarray) -> np.ndarray:
-    """uint8 [H, W, 3] -> uint8 [64, 64, 3]: means of areas, as the SDK has them."""
+    """uint8 [H, W, 3] -> uint8 [64, 64, 3]: means of areas, like the SDK."""
     return cv2.resize(picture, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA)
 
 
 def foreseen(frames: np.ndarray, fps: float, threads: int = 1) -> np.ndarray:
-    """Of frames uint8 [T, H, W, 3] of a clip: uint8 [T, horizons, 64, 64, 3], as a file has them. Raises MaquetteError
-    where the SDK's library was not built."""
+    """Predictions of `auto` from frames uint8 [T, H, W, 3] of a clip: uint8 [T, horizons, 64, 64, 3], in the format of
+    the files. Raises MaquetteError where the SDK's library is not built."""
     import maquette  # in the process that does it: its library starts threads
 
     count = len(frames)
@@ -62,7 +62,7 @@ def foreseen(frames: np.ndarray, fps: float, threads: int = 1) -> np.ndarray:
 
 
 def write_foreseen(job: tuple[Path, Path]) -> None:
-    """Of a clip's file, atomically."""
+    """Writes the predictions of a clip's file atomically."""
     source, path = job
     clip = read_clip(source)
     rgb = (clip.large or clip.small).rgb

@@ -12,7 +12,7 @@ _CAP_DB = 50.0  # of one picture: equal pictures would make every mean infinite
 
 
 def psnr_db(a: Tensor, b: Tensor) -> Tensor:
-    """Of each picture [B, H, W, 3], 0..255: float32 [B], at most 50 dB."""
+    """PSNR of each image [B, H, W, 3], 0..255: float32 [B], at most 50 dB."""
     square = (a.float().clamp(0, 255) - b.float().clamp(0, 255)).square().mean((1, 2, 3))
     return (10 * torch.log10(255**2 / square.clamp(min=1e-6))).clamp(max=_CAP_DB)
 

@@ -80,7 +80,7 @@ def frames_of(clips: Clips, clip: Tensor, now: Tensor, count: int) -> Tensor:
 
 @torch.no_grad()
 def figures_of(net: ConvolutionalNet, clips: Clips, foreseen: Tensor | None, frames: int) -> dict[str, float]:
-    """Of held-out clips, `frames` of them for each time ahead, spread evenly over clips and times."""
+    """PSNR on held-out clips: `frames` frames for each time ahead, spread evenly over clips and times."""
     figures: dict[str, float] = {}
     device, seen = clips.frames.device, net.shape.frames
     for h, ahead in enumerate(HORIZONS):

@@ -104,7 +104,7 @@ class Pyramid:
 
 
 def pyramid(keys: Tensor, levels: int) -> Pyramid:
-    """Of `visible` keys [H, W], sides multiples of 2^(levels - 1)."""
+    """The pyramid of `visible` keys [H, W], whose sides are multiples of 2^(levels - 1)."""
     # A point has one pixel, so no index comes twice; and what is visible in a coarser pixel is visible in a finer one.
     points = torch.sort(keys[keys != NOTHING] & _INDEX).values
     slots = []

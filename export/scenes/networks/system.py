@@ -27,7 +27,7 @@ class Networks(nn.Module):
 
 
 def config_of(saved: dict[str, Any]) -> SceneConfig:
-    """What `asdict(SceneConfig)` made, after a way through a file."""
+    """Restores a SceneConfig from the dict of `asdict` that a file stored."""
     extractor, refiner = saved["extractor"], saved["refiner"] | {"widths": tuple(saved["refiner"]["widths"])}
     if "folded" in refiner:  # the name in weights of before
         refiner["space_to_depth"] = refiner.pop("folded")

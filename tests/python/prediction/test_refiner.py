@@ -114,8 +114,8 @@ def test_a_training_of_what_is_foreseen_is_a_command_that_goes_on_from_weights(t
         assert torch.equal(own, first.state_dict()[name]), name
 
 
-def test_nothing_foreseen_is_said(tmp_path):
-    with pytest.raises(SystemExit, match=r"pictures.foreseen --split val --sets shapes"):
+def test_missing_predictions_are_named(tmp_path):
+    with pytest.raises(SystemExit, match=r"auto_predictions --split val --sets shapes"):
         auto_predictions.read_foreseen([tmp_path], ["shapes"], "val")
 
 

@@ -142,7 +142,7 @@ def test_the_network_that_mends_is_put_into_a_bundle_whose_rest_stays(tmp_path):
     settings = replace(read_settings(PREDICTION, PredictionSettings), frames=5, held_out_frames=5)
     manifest = prediction_refiner.put_mended(weights, bundle, tmp_path / "foreseen", ["shapes"], settings)
     after = {path.name: path.read_bytes() for path in bundle.iterdir()}
-    assert {name for name in after if after[name] != before[name]} == {"prediction_refiner.onnx", "manifest.json"}
+    assert {name for name in after if after[name] != before[name]} == {"mended.onnx", "manifest.json"}
     assert manifest["mended"] == {"before": 3, "max_ahead": 12, "fps": [10, 30]}
     assert manifest["training_data"] == json.loads(before["manifest.json"])["training_data"]
     cost = manifest["measured"]["int8_cost"]

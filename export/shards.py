@@ -1,4 +1,4 @@
-"""The training shard (docs/formats.md): many labelled pictures in one .npz file.
+"""The training shard (docs/reference/formats.md): many labelled pictures in one .npz file.
 
 Written by `export.people.dataset` (rendered people) and `export.teachers.shards` (photographs), read by training,
 calibration and evaluation. A label is uint8 [H, W, 4] = (I, U * 255, V * 255, instance); labels of photographs may know
@@ -50,7 +50,7 @@ _MIRROR_VALUE[REGION : REGION + COARSE_COUNT + 1] = REGION + MIRROR_COARSE
 
 
 class ShardError(ValueError):
-    """A shard is missing, or is not what docs/formats.md says."""
+    """A shard is missing, or is not what docs/reference/formats.md says."""
 
 
 def mirror_iuv(iuv: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""The manifest of a dense pose bundle (docs/formats.md): five graphs, the chart weights and the surface grid; those of
-the crop pass, where it has networks of its own."""
+"""The manifest of a dense pose bundle (docs/reference/formats.md): five graphs, the chart weights, the surface grid,
+and the networks of the crop pass, if it has its own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The manifest of a bundle of the edge network (docs/formats.md): `field.onnx`."""
+"""The manifest of a bundle of the edge network (docs/reference/formats.md): `field.onnx`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bundle for heads (docs/formats.md): the encoder, the prior, the template head if it has one, and the manifest.
+"""A bundle for heads (docs/reference/formats.md): encoder, prior, template head if it has one, and manifest.
 
     python -m export.heads.bundle --encoder encoder.onnx --prior prior.maqp --out .data/bundles/heads-fp32
     python -m export.heads.bundle --template template.maqt --out sdk/models/heads-int8     adds it to a bundle

@@ -4,7 +4,7 @@
     python -m export.people.dataset --variety wide --out .data/people-wide    # 640 x 512: small, tilted, crowded
 
 A shard is a function of (split, shard number) alone, so that many machines (`--cluster`) render the same set as one.
-Shards that are there are kept: a stopped run goes on where it was. Format: docs/formats.md. Splits share no
+Shards that are there are kept: a stopped run goes on where it was. Format: docs/reference/formats.md. Splits share no
 body, motion clip, fabric or photo.
 """
 

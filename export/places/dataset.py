@@ -2,7 +2,7 @@
 
     python -m export.places.dataset --split train --scenes 100 --processes 2 --out .data/places
 
-Each place is a function of (split, seed) alone, and its folder (docs/formats.md) appears atomically: what is
+Each place is a function of (split, seed) alone, and its folder (docs/reference/formats.md) appears atomically: what is
 there already is kept, so a stopped run goes on where it was. A place that fails, or never ends, is said and left out.
 Splits share no model, texture, photo, panorama or person.
 """

@@ -1,5 +1,5 @@
-"""A bundle for prediction (docs/formats.md): the graphs that make a frame codes and codes a frame, what codes stand for
-and how likely they are, and where it has one the transformer that knows better."""
+"""A bundle for prediction (docs/reference/formats.md): the graphs that encode and decode frames, the codes with their
+entries and probabilities, and the transformer if it has one."""
 
 from __future__ import annotations
 

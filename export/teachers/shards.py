@@ -3,7 +3,7 @@ people cut out and set before other places.
 
     python -m export.teachers.shards --photos .data/photos/train --out .data/photos/shards/train
 
-The format is that of rendered people (docs/formats.md), with the weaker labels of `export.shards`.
+The format is that of rendered people (docs/reference/formats.md), with the weaker labels of `export.shards`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The manifest of a bundle of scene networks (docs/reference/formats.md): `extractor.onnx`, `refiner.onnx`, `basis.bin`."""
+"""The manifest of a bundle of scene networks (docs/reference/formats.md): extractor, refiner and `basis.bin`."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
 def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
     """Measures novelty scores of a simulated camera of 640 x 480: median wall-clock time, processor time, and
     stages."""
-    novelty = maquette.Surprise(bundle_path=bundle, threads=threads)
+    novelty = maquette.Novelty(bundle_path=bundle, threads=threads)
     stats, used_ms = [], []
     for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
         begin = time.process_time()
@@ -267,7 +267,7 @@ def section(measured: dict) -> tuple[str, list]:
     parts: list = [
         "Frames predicted 1, 3, 5 and 8 frames after the latest frame: PSNR in dB (320 x 240). Motion: our optical "
         "flow. OpenCV DIS: constant velocity by its preset medium. auto: the default of an app. Refined: auto changed "
-        "by a network (MAQ_PREDICTION_NETWORK).",
+        "by a network (MAQ_PREDICTOR_REFINED).",
         table_of([], measured["sets"]) if measured["sets"] else "There were no clips.",
     ]
     structure = ssim_table(measured["sets"])

@@ -33,10 +33,10 @@ set(MAQ_HEADS_API "head/.*")
 set(MAQ_HEADS_HEADERS "head.*")
 set(MAQ_HEADS_EXPORTS "maq_head_.*")
 
-set(_names "concealer|novelty|prediction|predictor|surprise")
+set(_names "concealer|novelty|prediction|predictor")
 set(MAQ_PREDICTION_FOLDERS prediction concealment)
 set(MAQ_PREDICTION_MODELS prediction-int8)
-set(MAQ_PREDICTION_API "api_(${_names}).*")
+set(MAQ_PREDICTION_API "prediction/.*")
 set(MAQ_PREDICTION_HEADERS "(${_names}).*")
 set(MAQ_PREDICTION_EXPORTS "maq_(${_names})_.*|maq_pipeline_result_get_(novelty|predicted_frame)")
 

@@ -28,8 +28,8 @@ printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 102
 # What the clip shows next, beside what it did show, and how surprising each of its frames is.
 printf '\n== maquette predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out %s/next.mp4\n' "$out"
 "$maquette" predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out "$out/next.mp4"
-printf '\n== maquette predict tests/media/clip.mp4 --surprise --out %s/surprise.mp4\n' "$out"
-"$maquette" predict tests/media/clip.mp4 --surprise --out "$out/surprise.mp4"
+printf '\n== maquette novelty tests/media/clip.mp4 --out %s/novelty.mp4\n' "$out"
+"$maquette" novelty tests/media/clip.mp4 --out "$out/novelty.mp4"
 
 # The edges of a carton that a depth camera sees, and its size beside the true one.
 depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'

@@ -45,7 +45,7 @@ def shown(source: str, frames: int, folder: Path, *options: str) -> tuple[np.nda
 def bridged(folder: Path) -> np.ndarray:
     """While the camera stalls, which is some 46 frames after the start."""
     for frames in range(45, 55):
-        picture, report = shown(STALLS, frames, folder, "--next", "--bridge-gaps", "--ahead", "100")
+        picture, report = shown(STALLS, frames, folder, "--predict", "--conceal", "--ahead", "100")
         if report["prediction"]["now_is_predicted"]:
             return picture
     raise RuntimeError("No run ended with a bridged frame; the machine is too busy.")
@@ -100,10 +100,8 @@ def main() -> None:
         keep("desktop-head.jpg", sheet([run(PHOTO, "--head", *h)[44:756, :950] for h in HEADS], 3, 520))
         keep("desktop-demo-next.jpg", bridged(Path(temporary)))
         progress.update()
-        keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--next", "--surprise"))
-        keep(
-            "desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--next", "--uncertainty", "--sample", "--ahead", "300")
-        )
+        keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--predict", "--novelty"))
+        keep("desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--predict", "--entropy", "--sample", "--ahead", "300"))
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 
 

@@ -10,14 +10,14 @@
 #include <vector>
 
 #include "core/frame.h"
-#include "prediction/optical_flow.h"
+#include "prediction/flow/optical_flow.h"
 
 namespace {
 
 int find_motion(int width, int height) {
   if (width < 1 || height < 1) return 2;
   maq::WorkerThreads threads(1);
-  maq::GreyPyramid before, now;
+  maq::LumaPyramid before, now;
   maq::OpticalFlow optical_flow;
   maq::FlowField flow;
   std::vector<uint8_t> pixels(size_t(width) * size_t(height) * 3);

@@ -64,14 +64,13 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
   }
   const maquette::Context context;
   maq_predictor_config config = maquette::default_predictor_config();
-  config.threads = threads;
+  config.model.threads = threads;
   maquette::Predictor automatic(context, config);
-  config.method = MAQ_PREDICTION_MOTION;
+  config.method = MAQ_PREDICTOR_MOTION;
   maquette::Predictor motion(context, config);
-  config.method = MAQ_PREDICTION_NETWORK;
-  config.network_mode = MAQ_NETWORK_MENDED;
-  config.bundle_path = bundle;
-  maquette::Predictor by_network(context, config);
+  config.method = MAQ_PREDICTOR_REFINED;
+  config.model.bundle_path = bundle;
+  maquette::Predictor refined(context, config);
   const size_t farthest = *std::max_element(horizons.begin(), horizons.end());
   std::vector<Sums> sums(horizons.size());
   std::vector<double> push_ms, auto_push_ms, predict_ms, network_ms, push_cpu_ms, predict_cpu_ms;
@@ -83,7 +82,7 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
     motion.push(frame);
     const double after_push_ms = processor_ms();
     automatic.push(frame);
-    by_network.push(frame);
+    refined.push(frame);
     if (i < kFirstStart) continue;
     push_cpu_ms.push_back(after_push_ms - before_push_ms);
     push_ms.push_back(double(motion.stats().push_ms));
@@ -103,8 +102,8 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
       automatic.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
       sums[k].motion_fraction += double(automatic.stats().motion_fraction);
       sums[k].auto_db += psnr_db(predicted, truth);
-      by_network.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
-      network_ms.push_back(double(by_network.stats().networks_ms));
+      refined.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
+      network_ms.push_back(double(refined.stats().networks_ms));
       sums[k].network_db += psnr_db(predicted, truth);
     }
   }

@@ -15,16 +15,13 @@ from export.scenes.image_quality import ssim
 START_STEP_OF_SSIM = 2 * START_STEP  # SSIM takes longer than the predictions
 
 
-MENDED = 1  # MAQ_NETWORK_MENDED
-
-
 def structure_of(
     bgr: np.ndarray, fps: float, horizons: Sequence[int], bundle: Path, threads: int = 1
 ) -> dict[str, list[float]]:
     """Returns the mean SSIM by method and frames ahead, for frames BGR uint8 [T, H, W, 3]. bundle: has the refining
     network."""
     predictors = {name: maquette.Predictor(name, threads=threads) for name in ("last", "motion", "auto")}
-    predictors["network"] = maquette.Predictor("network", network_mode=MENDED, bundle_path=bundle, threads=threads)
+    predictors["network"] = maquette.Predictor("refined", bundle_path=bundle, threads=threads)
     rgb = np.ascontiguousarray(bgr[..., ::-1])
     dis = Dis(*bgr.shape[1:3])
     found: dict[str, list[list[float]]] = {name: [] for name in (*predictors, "dis")}

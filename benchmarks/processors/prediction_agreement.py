@@ -23,7 +23,7 @@ from rich.table import Table
 from benchmarks.processors.emulated import ROOT, Processor, add_arguments, compared, run_maquette, write_junit
 
 SOURCE = "stub:people?count=2&seed=3&size=64x64&frames=8"
-FROM, DRAWN = 5, 2  # the last observed frame, and the frames predicted after it
+FROM, SAMPLED = 5, 2  # the last observed frame, and the frames predicted after it
 CELLS = 16  # cells a side of a frame of codes
 MAX_LEVELS = 1  # accepted difference of pixels in cells with equal codes
 BAR = 0.99  # fraction of cells
@@ -44,7 +44,7 @@ class PredictionAgreement:
 
 
 def read_novelty(folder: Path) -> list[dict]:
-    return [json.loads(line) for line in (folder / "surprise.json").read_text().splitlines()]
+    return [json.loads(line) for line in (folder / "novelty.json").read_text().splitlines()]
 
 
 def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def compare(reference: Path, other: Path) -> PredictionAgreement:
             f"{reference} has {len(ours)} frames and {len(names)} images, {other} {len(theirs)} and {len(others)}."
         )
     differences = [abs(a["bits"] - b["bits"]) / a["bits"] for a, b in zip(ours, theirs, strict=True)]
-    flags = [[frame[name] for frame in found for name in ("event", "cut", "start")] for found in (ours, theirs)]
+    flags = [[frame[name] for frame in found for name in ("event", "cut", "stream_start")] for found in (ours, theirs)]
     cells = [same_cells(*(cv2.imread(str(folder / name)) for folder in (reference, other))) for name in names]
     return PredictionAgreement(len(ours), max(differences), flags[0] == flags[1], float(np.mean(cells)))
 
@@ -74,9 +74,10 @@ def run(processor: Processor, bundle: Path, out: Path) -> None:
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     settings = ["--bundle", str(bundle), "--threads", "1"]
-    (out / "surprise.json").write_text(run_maquette(processor, ["predict", SOURCE, "--surprise", "--json", *settings]))
-    drawn = ["--samples", "1", "--temperature", "0", "--from", str(FROM), "--frames", str(DRAWN), "--out", str(out)]
-    run_maquette(processor, ["predict", SOURCE, *drawn, *settings])
+    (out / "novelty.json").write_text(run_maquette(processor, ["novelty", SOURCE, "--json", *settings]))
+    sampling = ["--samples", "1", "--temperature", "0", "--from", str(FROM)]
+    sampling += ["--frames", str(SAMPLED), "--out", str(out)]
+    run_maquette(processor, ["predict", SOURCE, *sampling, *settings])
 
 
 def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar: float) -> None:

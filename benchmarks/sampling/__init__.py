@@ -1,6 +1,6 @@
 """Measures frames that the transformer samples, beside the last frame and motion."""
 
-OF_TIMES = ("four_samples_times", "sampled_frames_a_second", "passes_frames_a_second", "recomputing_times")
+OF_TIMES = ("four_samples_times", "sampled_frames_a_second")
 METRICS = (
     "sampled_mean_gain_db",
     "refined_gain_db",

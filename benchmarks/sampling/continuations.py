@@ -13,8 +13,7 @@ from export.prediction.data import Clips
 
 GIVEN, MADE = 5, 11  # frames of a clip, as in the published system
 SAMPLES = 16
-PASSES, TEMPERATURES = (4, 8, 12), (0.25, 0.5, 1.5)  # settings with few samples; temperature 1 has SAMPLES
-MENDED, DRAWN = 1, 3  # MAQ_NETWORK_MENDED, MAQ_NETWORK_DRAWN
+TEMPERATURES = (0.25, 0.5, 1.5)  # settings with few samples; temperature 1 has SAMPLES
 SEED = 1
 
 # Maps frames of a clip [GIVEN, H, W, 3] and the seconds between them to images [samples, MADE, H, W, 3], and to bits of
@@ -40,18 +39,16 @@ def predicted(name: str, **settings: object) -> Method:
 
 
 def sampled(samples: int, bundle: Path, **settings: float) -> Method:
-    """Returns a sampling method. settings: temperature, top_k, passes."""
-    predictor = maquette.Predictor(
-        method="network", network_mode=DRAWN, bundle_path=bundle, threads=1, seed=SEED, **settings
-    )
+    """Returns a sampling method. settings: temperature, top_k."""
+    predictor = maquette.Predictor("sampled", bundle_path=bundle, threads=1, seed=SEED, **settings)
 
     def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray]:
         shown(predictor, frames, step_s)
-        predictor.draw(samples, MADE, step_s)
+        predictor.sample(samples, MADE, step_s)
         numbers = range(1, MADE + 1)
         # One time after another, so that the work that all samples share is done once.
-        images = np.stack([[predictor.drawn(s, k).pixels() for s in range(samples)] for k in numbers], 1)
-        return images, np.stack([[predictor.uncertainty(s, k) for k in numbers] for s in range(samples)])
+        images = np.stack([[predictor.acquire_sample(s, k).pixels() for s in range(samples)] for k in numbers], 1)
+        return images, np.stack([[predictor.entropy_map(s, k) for k in numbers] for s in range(samples)])
 
     return go_on
 
@@ -61,10 +58,8 @@ def methods(bundle: Path, samples: int) -> dict[str, Method]:
         "last frame": predicted("last"),
         "motion": predicted("motion"),
         "auto": predicted("auto"),
-        "auto, refined": predicted("network", network_mode=MENDED, bundle_path=bundle),
+        "auto, refined": predicted("refined", bundle_path=bundle),
         "likeliest": sampled(1, bundle, temperature=0),
-        "likeliest, 1 pass": sampled(1, bundle, temperature=0, passes=1),
-        **{f"likeliest, {passes} passes": sampled(1, bundle, temperature=0, passes=passes) for passes in PASSES},
         **{f"temperature {value:g}": sampled(4, bundle, temperature=value) for value in TEMPERATURES},
         "temperature 1": sampled(samples, bundle, temperature=1),
     }

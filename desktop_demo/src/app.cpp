@@ -26,14 +26,14 @@ App::App(const Options& options)
       panel_(window_),
       people_(context_, options, window_, painter_),
       edges_(context_, options, window_, painter_),
-      next_(context_, options, window_, painter_),
+      prediction_(context_, options, window_, painter_),
       scene_(context_, options, window_, painter_),
       head_(context_, options, window_, painter_),
       seeks_head_(options.head),
       saver_(context_, options.out) {
   if (!options.texture.empty()) load_outfit(options.texture);
   if (options.edges) live_ = &edges_;
-  if (options.next) live_ = &next_;
+  if (options.predict) live_ = &prediction_;
   open(options.source);
 }
 
@@ -99,7 +99,7 @@ void App::take_keys() {
       case GLFW_KEY_F3: perform(Action::kClip); break;
       case GLFW_KEY_F4: perform(Action::kRecord); break;
       case GLFW_KEY_F5: perform(Action::kOtherView); break;
-      case GLFW_KEY_F7: perform(Action::kNext); break;
+      case GLFW_KEY_F7: perform(Action::kPrediction); break;
       case GLFW_KEY_F6: ImGui::SetWindowFocus(ImGui::GetIO().NavActive ? nullptr : "panel"); break;
       case GLFW_KEY_F11: window_.toggle_full_screen(); break;
       case GLFW_KEY_ESCAPE: shows_help_ = false; break;
@@ -144,7 +144,7 @@ void App::perform(Action action) {
     case Action::kNone: break;
     case Action::kOpenCamera: live_->open_camera(); break;
     case Action::kOtherView: view_ == &edges_ ? show(people_) : show(edges_); break;
-    case Action::kNext: view_ == &next_ ? show(people_) : show(next_); break;
+    case Action::kPrediction: view_ == &prediction_ ? show(people_) : show(prediction_); break;
     case Action::kBack: show(*live_); break;
     case Action::kHead: show_head(false); break;
     case Action::kAddToHead: show_head(true); break;
@@ -159,10 +159,10 @@ void App::perform(Action action) {
 void App::show(LiveView& view) {
   view_ = live_ = &view;
   scene_.open("");
-  LiveView* const all[] = {&people_, &edges_, &next_};
+  LiveView* const all[] = {&people_, &edges_, &prediction_};
   for (LiveView* const each : all) each->set_visible(each == &view);
-  // People and what comes next are views of one source.
-  LiveView* const other = &view == &people_ ? all[2] : &view == &next_ ? all[0] : nullptr;
+  // People and prediction are views of one source.
+  LiveView* const other = &view == &people_ ? all[2] : &view == &prediction_ ? all[0] : nullptr;
   if (other != nullptr && other->has_source()) {
     view.open(other->hand_over());
   } else if (!view.has_source()) {
@@ -188,7 +188,7 @@ void App::open(const std::string& path_or_uri) {
   view_ = &scene_;
   people_.set_visible(false);
   edges_.set_visible(false);
-  next_.set_visible(false);
+  prediction_.set_visible(false);
   scene_.open(path_or_uri);
 }
 

@@ -8,10 +8,10 @@
 
 #include "edges_view.h"
 #include "head_view.h"
-#include "next_view.h"
 #include "options.h"
 #include "panel.h"
 #include "people_view.h"
+#include "prediction_view.h"
 #include "scene_view.h"
 #include "screen/painter.h"
 #include "screen/window.h"
@@ -42,10 +42,10 @@ class App {
   Panel panel_;
   PeopleView people_;
   EdgesView edges_;
-  NextView next_;
+  PredictionView prediction_;
   SceneView scene_;
   HeadView head_;
-  LiveView* live_ = &people_;  // or &edges_, &next_: shown, or behind the scene
+  LiveView* live_ = &people_;  // or &edges_, &prediction_: shown, or behind the scene
   MainView* view_ = &people_;  // live_, &scene_ or &head_
   bool seeks_head_ = false;    // of the first picture
   bool shows_panel_ = true, shows_help_ = false;

@@ -1,5 +1,5 @@
 // maquette-demo: a person's own body surface, live from a webcam; scenes; edges of a depth camera; heads; what comes
-// next.
+// predicted frames.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -41,8 +41,8 @@ int main(int argc, char** argv) try {
 
   CLI::App cli(
       "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
-      "shows sharp edges in depth; makes 3D heads; shows what a camera will show next, and what of it is "
-      "surprising.\n\n"
+      "shows sharp edges in depth; makes 3D heads; predicts the next frames of a camera and scores "
+      "their novelty.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
@@ -50,10 +50,10 @@ int main(int argc, char** argv) try {
       "  maquette-demo photo.jpg --head      a 3D head of the person in a photo, or in the first picture of a camera\n"
       "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, a picture:\n"
       "  maquette-demo --edges 'image:depth.png?depth_unit=0.001&fov=60'\n"
-      "  maquette-demo --next                now, and what comes 200 ms later (--ahead), predicted\n"
-      "  maquette-demo --next --bridge-gaps 'stub:people?stall=300ms@3s'\n"
+      "  maquette-demo --predict             now, and the predicted frame 200 ms later (--ahead)\n"
+      "  maquette-demo --predict --conceal 'stub:people?stall=300ms@3s'\n"
       "                                      predicted frames, marked in magenta, while the camera stalls\n"
-      "  maquette-demo --next --surprise     and how surprising each frame is, where, and what stood out\n"
+      "  maquette-demo --predict --novelty   also how unexpected each frame is, where, and the events\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
@@ -74,32 +74,31 @@ int main(int argc, char** argv) try {
   cli.add_option("--fit-seconds", options.fit_seconds, "Of heads: the time for the fit to the pixels")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
-  auto* const next = cli.add_flag("--next", options.next, "What the source will show next, beside what it shows")
-                         ->excludes("--edges")
-                         ->excludes("--head");
-  cli.add_option("--ahead", ahead_ms, "How far ahead, in milliseconds")
+  auto* const predict = cli.add_flag("--predict", options.predict, "Show the source and its predicted frame")
+                            ->excludes("--edges")
+                            ->excludes("--head");
+  cli.add_option("--ahead", ahead_ms, "Time ahead, in milliseconds")
       ->capture_default_str()
-      ->needs(next)
+      ->needs(predict)
       ->check(CLI::Range(kMinAheadMs, kMaxAheadMs));
-  cli.add_option("--method", method,
-                 "By which it is predicted; auto: whichever was right about the latest frames; network: that, mended "
-                 "by a network")
+  cli.add_option(
+         "--method", method,
+         "How frames are predicted. auto: last and motion, blended by their past errors; refined: auto, refined "
+         "by a network")
       ->capture_default_str()
-      ->needs(next)
+      ->needs(predict)
       ->check(CLI::IsMember(kMethodNames));
-  cli.add_flag("--bridge-gaps", options.prediction.bridges_gaps,
-               "Predicted frames, marked, where the camera's are late or missing, for 300 ms at most")
-      ->needs(next);
-  cli.add_flag("--surprise", options.prediction.finds_surprise,
-               "How surprising each frame is: where, a curve, and the events that stood out")
-      ->needs(next);
-  cli.add_flag("--uncertainty", options.prediction.finds_uncertainty,
-               "What of the coming picture is uncertain, in red, as networks foresee it")
-      ->needs(next);
-  cli.add_flag("--sample", options.prediction.draws_sample, "A picture that may come, drawn by networks, beside them")
-      ->needs(next);
+  cli.add_flag("--conceal", options.prediction.conceals_gaps,
+               "Fill gaps of at most 300 ms with predicted frames, which are marked")
+      ->needs(predict);
+  cli.add_flag("--novelty", options.prediction.scores_novelty,
+               "Score how unexpected each frame is: a map, a curve, and the events")
+      ->needs(predict);
+  cli.add_flag("--entropy", options.prediction.shows_entropy, "Show uncertain cells of the predicted frame in red")
+      ->needs(predict);
+  cli.add_flag("--sample", options.prediction.shows_sample, "Show one sampled future beside them")->needs(predict);
   cli.add_option("--prediction-bundle", options.prediction.bundle,
-                 "Folder of the networks for surprise, uncertainty, samples and --method network");
+                 "Folder of the networks for novelty, entropy, samples and --method refined");
   cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh,
                "The body's surface in the corner, with what is seen of it in colour");
@@ -144,7 +143,7 @@ int main(int argc, char** argv) try {
                                      kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
   options.prediction.ahead_s = ahead_ms / 1e3;
   options.prediction.method =
-      maq_prediction_method(std::find(kMethodNames.begin(), kMethodNames.end(), method) - kMethodNames.begin());
+      maq_predictor_method(std::find(kMethodNames.begin(), kMethodNames.end(), method) - kMethodNames.begin());
   options.compare = Compare(std::find(kCompareNames.begin(), kCompareNames.end(), compare) - kCompareNames.begin());
   const bool is_size = std::sscanf(size.c_str(), "%dx%d", &options.width_px, &options.height_px) == 2;
   if (!is_size || std::min(options.width_px, options.height_px) < 64 ||
@@ -157,7 +156,7 @@ int main(int argc, char** argv) try {
   options.edges_model.edges.skip_planes = skip_planes ? 1 : 0;
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless) {
-    options.live.real_time = options.prediction.bridges_gaps;  // others have no gaps
+    options.live.real_time = options.prediction.conceals_gaps;  // others have no gaps
     options.live.max_results = options.frames;
     options.live.reconnect_ms = 4000;
   }

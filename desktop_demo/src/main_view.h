@@ -1,4 +1,4 @@
-// What fills the window beside the panel: people (PeopleView), edges (EdgesView), what comes next (NextView), a
+// What fills the window beside the panel: people (PeopleView), edges (EdgesView), prediction (PredictionView), a
 // scene (SceneView) or a head (HeadView).
 #pragma once
 
@@ -16,7 +16,7 @@ enum class Action {
   kNone,
   kOpenCamera,
   kOtherView,
-  kNext,
+  kPrediction,
   kHead,       // of the person in the picture
   kAddToHead,  // the picture, for the head so far
   kBack,       // to the live view

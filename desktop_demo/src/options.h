@@ -21,16 +21,16 @@ constexpr std::array<const char*, 3> kCompareNames = {"none", "slider", "error"}
 // In the order of maq_head_shading.
 constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normals", "template", "depth"};
 
-// In the order of maq_prediction_method.
-constexpr std::array<const char*, 4> kMethodNames = {"auto", "last", "motion", "network"};
+// In the order of maq_predictor_method.
+constexpr std::array<const char*, 4> kMethodNames = {"auto", "last", "motion", "refined"};
 constexpr double kMinAheadMs = 33, kMaxAheadMs = 1000;
 
 struct Options {
-  std::string source = kFirstCamera;      // or a file, a folder with a capture
-  bool edges = false;                     // of the source, rather than people
-  bool head = false;                      // of the person in its first picture
-  bool next = false;                      // what the source will show next
-  maquette::PredictionChoice prediction;  // and surprise
+  std::string source = kFirstCamera;  // or a file, a folder with a capture
+  bool edges = false;                 // of the source, rather than people
+  bool head = false;                  // of the person in its first picture
+  bool predict = false;               // the source with its predicted frames
+  maquette::PredictionChoice prediction;
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
   double fit_seconds = 3;  // of a head
   std::string heads_bundle;

@@ -53,9 +53,9 @@ void Panel::draw_help(bool* is_open) const {
       {"1 to 5, C, E, Esc", "head: colour, shape, normals, template, depth; over the photo; export; cancel the fit"},
       {"F5", "edges of a depth camera; again: people"},
       {"1 to 3, C, B, K", "edges: depth, distance, plain; curves, boxes; planes are skipped"},
-      {"F7", "what the source will show next, short gaps bridged; again: people"},
-      {"1 to 3, B, S, arrows", "next: auto, last frame, motion; bridge gaps; surprise; how far ahead (or drag)"},
-      {"U, D", "next: what of it is uncertain, in red; a picture that may come, drawn"},
+      {"F7", "prediction: the source and its predicted frame; again: people"},
+      {"1 to 4, B, S, arrows", "prediction: auto, last, motion, refined; conceal gaps; novelty; time ahead (or drag)"},
+      {"U, D", "prediction: entropy in red; one sampled future"},
       {"F6", "into the panel: arrows, Space, Enter; again: back to the picture"},
       {"H, F11", "panel, full screen"},
       {"Ctrl+Q", "ends the program"}};

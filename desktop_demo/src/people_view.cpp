@@ -112,7 +112,7 @@ void PeopleView::draw_boxes() const {
 maquette::Saver::Companions PeopleView::companions() const {
   if (frame().result == nullptr) return nullptr;
   return [result = frame().result](const std::string& folder, const std::string& stem) {
-    result->save(folder, stem);
+    result->save(folder + "/" + stem);
     return "_IUV.png, _INDS.png and .json";
   };
 }
@@ -145,7 +145,7 @@ Action PeopleView::draw_panel() {
                      stats.network_width_px, stats.network_height_px);
   draw_model_options();
   if (ImGui::Button("Edges of a depth camera (F5)")) action = Action::kOtherView;
-  if (ImGui::Button("What comes next (F7)")) action = Action::kNext;
+  if (ImGui::Button("Prediction (F7)")) action = Action::kPrediction;
   if (ImGui::Button("Head of this person (G)")) action = Action::kHead;
   ImGui::SameLine();
   if (ImGui::Button("add (A)")) action = Action::kAddToHead;

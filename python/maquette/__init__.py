@@ -22,15 +22,15 @@ from maquette.heads import (
     MorphTarget,
 )
 from maquette.native import MaquetteError, library_path, native
-from maquette.prediction import Concealer, Predictor, Surprise, SurpriseScore
+from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
 
 __all__ = [
     "Box", "Camera", "Capture", "Concealer", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
     "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadImage", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Origin", "Person", "PinholeCamera", "PixelFormat",
-    "Predictor", "Scene", "SceneImage", "SceneRenderer", "Source", "Surprise", "SurpriseScore", "View", "library_path",
-    "list_cameras", "part_colours", "part_name", "sdk_version",
+    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person",
+    "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneImage", "SceneRenderer", "Source", "View",
+    "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
 ]  # fmt: skip
 
 

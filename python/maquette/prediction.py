@@ -1,5 +1,4 @@
-"""Prediction: what a stream will show next, how surprising what it shows is, and live sources whose short gaps are
-bridged."""
+"""Prediction: the next frames of a stream, its novelty, and live sources with short gaps filled."""
 
 from __future__ import annotations
 
@@ -13,147 +12,151 @@ import numpy as np
 from maquette.frames import Frame, Source, acquired_frame
 from maquette.native import NativeObject, native
 
-METHODS = ("auto", "last", "motion", "network")  # of maq_prediction_method
-NETWORK_MODES = ("auto", "mended", "expected", "drawn")  # of maq_network_mode
-SURPRISE_METHODS = ("auto", "table")  # of maq_surprise_method
+METHODS = ("auto", "last", "motion", "refined", "sampled")  # in the order of maq_predictor_method
+NOVELTY_METHODS = ("auto", "bigram")  # in the order of maq_novelty_method
 
 
 class Predictor(NativeObject):
-    """Gets the frames of a stream as they come, and makes pictures of what it will show a while later.
+    """Takes the frames of a stream and predicts later ones.
 
-    method: "motion" (everything moves on as it moved), "last" (the last frame), "auto": both mixed, place by place, by
-    how right each was about the frames that have come, or "network": that, changed by what networks foresee (not in
-    every bundle). networks_of: another one of that method, whose networks this one uses as well. settings: fields of
-    maq_predictor_config by their names. It sees pictures, not the world: never steer
-    anything by what it made up.
+    method: "last" repeats the last frame. "motion" moves everything on at its speed. "auto" blends both per cell,
+    weighted by their past errors. "refined" is "auto", refined by a network. "sampled" samples possible futures by a
+    transformer. shared_with: a predictor of the same method, refined or sampled, whose networks this one shares.
+    settings: fields of maq_predictor_config by their names. Predicted frames are guesses: never steer anything by
+    them.
     """
 
-    def __init__(self, method: str = "auto", networks_of: Predictor | None = None, **settings: Any) -> None:
+    def __init__(self, method: str = "auto", shared_with: Predictor | None = None, **settings: Any) -> None:
         n = native()
-        shared = {} if networks_of is None else {"networks_of": networks_of.handle}
+        shared = {} if shared_with is None else {"shared_with": shared_with.handle}
         config = n.config("maq_predictor_config", {"method": _method(method)} | shared | settings)
         super().__init__(n.create("maq_predictor", n.context, config))
 
     def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> None:
-        """The stream's next frame: one of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in seconds, from
-        any moment on. What came before is forgotten at a cut, another size or a second's pause. Raises
-        MaquetteError."""
+        """Adds the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
+        seconds, counted from any moment. Earlier frames are forgotten at a cut, another size or a pause of a second.
+        Raises MaquetteError."""
         native().call("maq_predictor_push", self.handle, _timed_frame(image, time_s).handle)
 
     def predict(self, ahead_s: float) -> Frame:
-        """The picture `ahead_s` seconds (0 to 10) after the latest frame, of that frame's size and format; its `origin`
-        says that it is made up. Hold at most four at once (frame_pool_size). Raises MaquetteError, also before the
+        """Returns the frame `ahead_s` seconds (0 to 10) after the newest one, in the same size and format, marked as
+        predicted by its `origin`. Hold at most four at once (frame_pool_size). Raises MaquetteError, also before the
         first frame."""
         n = native()
-        made = n.create(
+        frame = n.create(
             "maq_frame", self.handle, ahead_s, function="maq_predictor_predict", release="maq_frame_release"
         )
-        return Frame.of_handle(made)
+        return Frame.of_handle(frame)
 
-    def draw(self, samples: int, frames: int, step_s: float) -> None:
-        """Draws `samples` (1 to 16) of what the stream may show, each `frames` (1 to 64) frames, `step_s` (to 0.125)
-        apart: of method "network", network_mode=3 (MAQ_NETWORK_DRAWN), by its temperature, top_k, seed and passes. A
-        sample is the same however many others are drawn. Until the next push, prediction or draw `drawn` and
-        `uncertainty` give what was drawn. Raises MaquetteError."""
-        native().call("maq_predictor_draw", self.handle, samples, frames, step_s)
+    def sample(self, sample_count: int, frame_count: int, step_s: float) -> None:
+        """Samples `sample_count` (1 to 16) possible futures of `frame_count` (1 to 64) frames, `step_s` (at most 0.125)
+        seconds apart. The method is "sampled"; temperature, top_k and seed apply. Results depend only on the seed and
+        the pushed frames. They are valid until the next push, predict or sample. Raises MaquetteError."""
+        native().call("maq_predictor_sample", self.handle, sample_count, frame_count, step_s)
 
-    def drawn(self, sample: int, number: int) -> Frame:
-        """The picture of frame `number`, from 1, of a sample, from 0. Hold at most four at once (frame_pool_size).
-        Raises MaquetteError for one that was not drawn."""
-        made = native().create(
-            "maq_frame", self.handle, sample, number,
-            function="maq_predictor_acquire_drawn", release="maq_frame_release",
+    def acquire_sample(self, sample_index: int, frame_index: int) -> Frame:
+        """Decodes frame `frame_index` (1-based) of sample `sample_index` (0-based). Hold at most four at once
+        (frame_pool_size). Raises MaquetteError for a frame that was not sampled."""
+        frame = native().create(
+            "maq_frame", self.handle, sample_index, frame_index,
+            function="maq_predictor_acquire_sample", release="maq_frame_release",
         )  # fmt: skip
-        return Frame.of_handle(made)
+        return Frame.of_handle(frame)
 
-    def uncertainty(self, sample: int, number: int) -> np.ndarray:
-        """How uncertain that frame was when it was drawn: the entropy of a code in bits, float32 [16, 16], a cell for
-        each part of the frame. Raises MaquetteError for one that was not drawn."""
+    def entropy_map(self, sample_index: int, frame_index: int) -> np.ndarray:
+        """Returns the mean entropy of a code in bits per cell of that frame: float32 [16, 16]. Raises MaquetteError for
+        a frame that was not sampled."""
         n = native()
         bits = np.zeros(int(self.stats["cell_count"]), np.float32)
         into = n.ffi.from_buffer("float[]", bits)
-        n.call("maq_predictor_copy_uncertainty", self.handle, sample, number, into, bits.size)
+        n.call("maq_predictor_copy_entropy_map", self.handle, sample_index, frame_index, into, bits.size)
         side = math.isqrt(bits.size)
         return bits.reshape(side, side)
 
+    def cancel(self) -> None:
+        """Cancels the sampling that runs on another thread, or else the next one: it raises MaquetteError."""
+        native().call("maq_predictor_cancel", self.handle)
+
     def reset(self) -> None:
-        """Forgets the frames so far, as before another stream."""
+        """Forgets the frames so far, to begin another stream."""
         native().call("maq_predictor_reset", self.handle)
 
     @property
     def stats(self) -> dict[str, float]:
-        """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`: an
-        index into METHODS; `motion_fraction`: how much of the picture is motion's; `network_mode`: an index into
-        NETWORK_MODES, whose networks ran (0: none); `step_count`, `pass_count`: how often."""
+        """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method` is
+        an index into METHODS: the method that made the latest prediction."""
         return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
 
 
 @dataclass(frozen=True, eq=False)
-class SurpriseScore:
-    """Of one frame. bits: a code, mean of the frame: hundredths where nothing changes, 1 to 3 where much moves. ratio:
-    to the median of the 8 frames before, 1 where these are not known. map: float32 [16, 16], bits of a code by cell.
-    is_event: whether it is a cut, or the ratio is event_ratio or more, or 1 / event_ratio or less. is_cut: whether
-    nothing in it follows from the frame before, as at a cut or a black-out. is_start: whether the frame does not go on
-    from the one before: the first, another size or format, a pause; its bits say how rare its codes are."""
+class NoveltyScore:
+    """The score of one frame.
+
+    bits: mean of all codes: about 0.03 when nothing changes, 1 to 3 when much moves. ratio: to the median of the 8
+    frames before; 1 while they are unknown. is_event: a cut, or the ratio reached event_ratio or 1 / event_ratio.
+    is_cut: the previous frame does not make this one more likely. is_stream_start: the frame continues no stream: the
+    first one, another size or format, a pause. map: float32 [16, 16], bits of a code per cell.
+    """
 
     bits: float
     ratio: float
     is_event: bool
     is_cut: bool
-    is_start: bool
+    is_stream_start: bool
     map: np.ndarray
 
 
-class Surprise(NativeObject):
-    """How surprising each frame of a stream is after the one before, and where, in bits.
+class Novelty(NativeObject):
+    """Scores how unexpected each frame of a stream is after the frames before, and where, in bits.
 
-    networks_of: another stream, whose networks this one uses as well. method: what says how likely codes are: "auto"
-    (the transformer, where the bundle has it), or "table", which takes next to no time. settings: fields of
-    maq_surprise_config by their names, as event_ratio=6. Raises MaquetteError.
+    shared_with: another stream whose networks this one shares. method: the source of probabilities: "auto" (the
+    bundle's transformer, if it has one) or "bigram", which takes about 0 ms. settings: fields of maq_novelty_config by
+    their names, such as event_ratio=6. Raises MaquetteError.
     """
 
-    def __init__(self, networks_of: Surprise | None = None, method: str = "auto", **settings: Any) -> None:
+    def __init__(self, shared_with: Novelty | None = None, method: str = "auto", **settings: Any) -> None:
         n = native()
-        own = {"method": _method(method, SURPRISE_METHODS)}
-        shared = {} if networks_of is None else {"networks_of": networks_of.handle}
-        config = n.config("maq_surprise_config", own | shared | settings)
-        super().__init__(n.create("maq_surprise", n.context, config))
+        own = {"method": _method(method, NOVELTY_METHODS)}
+        shared = {} if shared_with is None else {"shared_with": shared_with.handle}
+        config = n.config("maq_novelty_config", own | shared | settings)
+        super().__init__(n.create("maq_novelty", n.context, config))
 
-    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> SurpriseScore:
-        """The stream's next frame: one of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in seconds. Raises
-        MaquetteError."""
+    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> NoveltyScore:
+        """Scores the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
+        seconds. Raises MaquetteError."""
         n = native()
-        score = n.sized("maq_surprise_score")
-        n.call("maq_surprise_push", self.handle, _timed_frame(image, time_s).handle, score)
+        score = n.sized("maq_novelty_score")
+        n.call("maq_novelty_push", self.handle, _timed_frame(image, time_s).handle, score)
         cells = np.empty((score.rows, score.columns), np.float32)
-        n.call("maq_surprise_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
-        flags = (bool(score.is_event), bool(score.is_cut), bool(score.is_start))
-        return SurpriseScore(score.bits, score.ratio, *flags, cells)
+        n.call("maq_novelty_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
+        flags = (bool(score.is_event), bool(score.is_cut), bool(score.is_stream_start))
+        return NoveltyScore(score.bits, score.ratio, *flags, cells)
 
     def reset(self) -> None:
-        """Forgets the frames so far, as before another stream."""
-        native().call("maq_surprise_reset", self.handle)
+        """Forgets the frames so far, to begin another stream."""
+        native().call("maq_novelty_reset", self.handle)
 
-    def rebuilt(self) -> Frame:
-        """What the network saw of the latest frame: a picture of 64 x 64; what is not in it cannot be surprising. Hold
-        at most four at once. Raises MaquetteError."""
-        n = native()
-        made = n.create("maq_frame", self.handle, function="maq_surprise_acquire_rebuilt", release="maq_frame_release")
-        return Frame.of_handle(made)
+    def reconstruction(self) -> Frame:
+        """Decodes the codes of the latest frame: an image of 64 x 64 pixels with the detail that the network kept.
+        Hold at most four at once. Raises MaquetteError."""
+        frame = native().create(
+            "maq_frame", self.handle, function="maq_novelty_acquire_reconstruction", release="maq_frame_release"
+        )
+        return Frame.of_handle(frame)
 
     @property
     def stats(self) -> dict[str, float]:
-        """Milliseconds of the latest frame, and counts: the fields of maq_surprise_stats."""
-        return native().stats("maq_surprise_stats", "maq_surprise_get_stats", self.handle)
+        """Milliseconds of the latest frame, and counts: the fields of maq_novelty_stats."""
+        return native().stats("maq_novelty_stats", "maq_novelty_get_stats", self.handle)
 
 
 class Concealer(NativeObject):
-    """A live source without short gaps: where a frame is not there when it is due, one that was predicted before;
-    iterate over it. `Frame.origin` of each says which; what acts on frames, such as a robot, must look at it.
+    """A live source whose short gaps are filled with predicted frames; iterate over it.
 
-    Until it is closed it takes the source's frames, and `Source.read` fails. max_gap_s: how long a camera that sends
-    nothing is bridged; then reading goes on as of the source itself. settings: fields of maq_concealer_config by their
-    names. Raises MaquetteError for a source that is not live.
+    `Frame.origin` tells predicted frames from captured ones. A program that acts on frames, such as a robot's, must
+    check it. Until the concealer is closed it takes the source's frames, and `Source.read` fails. max_gap_s: the
+    longest gap that is filled; then reading continues as from the source. settings: fields of maq_concealer_config by
+    their names. Raises MaquetteError for a source that is not live.
     """
 
     def __init__(self, source: Source, max_gap_s: float = 0.3, method: str = "auto", **settings: Any) -> None:
@@ -161,10 +164,10 @@ class Concealer(NativeObject):
         own = {"max_gap_ms": round(max_gap_s * 1000), "method": _method(method)}
         config = n.config("maq_concealer_config", own | settings)
         super().__init__(n.create("maq_concealer", n.context, source.handle, config))
-        self._source = source  # forgotten by its owner, it would be stopped
+        self._source = source  # keeps it open
 
     def read(self, timeout_s: float | None = None) -> Frame | None:
-        """The next frame, or None after the source's last one. Raises MaquetteError, TimeoutError."""
+        """Returns the next frame, or None after the source's last one. Raises MaquetteError, TimeoutError."""
         return acquired_frame("maq_concealer_acquire_frame", self.handle, timeout_s)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -173,7 +176,7 @@ class Concealer(NativeObject):
 
     @property
     def stats(self) -> dict[str, float]:
-        """How many frames were captured in time, predicted, late and dropped, and how long was waited: the fields of
+        """Counts of captured, predicted, late and dropped frames, and waiting times: the fields of
         maq_concealer_stats."""
         return native().stats("maq_concealer_stats", "maq_concealer_get_stats", self.handle)
 

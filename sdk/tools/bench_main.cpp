@@ -254,8 +254,7 @@ int main(int argc, char** argv) try {
                  "--predict one clip or camera; default: two people of stub:people");
   CLI::Option* const predict = app.add_flag(
       "--predict", predicts,
-      "Measure prediction instead of dense pose: the surprise of a frame that arrives, the next picture by "
-      "motion, and pictures drawn by networks (docs/prediction.md)");
+      "Measure prediction instead of dense pose: novelty of a frame, the next frame by each method, and samples");
   app.add_option("--json", options.json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
   for (const char* of_dense_pose : {"--no-spin", "--provider", "--size", "--threshold", "--max-proposals",
@@ -274,13 +273,13 @@ int main(int argc, char** argv) try {
       "A frame is counted from asking the source for it to having the result. CPU ms is the CPU time of all threads\n"
       "for one frame, a measure of its energy on every machine. Compare figures of one run; a warning says why\n"
       "times are unreliable: other processes busy, few runs, wide spread.\n\n"
-      "With --predict all cases go alternately through the same 16 frames of the source, held in memory: surprise and\n"
-      "motion at their size, what is drawn by networks at 64 x 64. A run of surprise is a frame with its map; of the\n"
-      "others a frame that is pushed and the next picture made of it, or 11 of each sample, of which one is made.\n\n"
+      "With --predict all cases run in turn over the same 16 frames of the source, held in memory: samples at 64 x 64\n"
+      "pixels, the others at full size. A run of novelty is one frame with its map. A run of a predictor pushes one\n"
+      "frame and predicts the next; a run of \"11 sampled\" samples 11 frames and decodes one.\n\n"
       "Examples:\n"
       "  maquette bench\n"
       "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json\n"
-      "  maquette bench --predict                             # a minute; surprise and pictures a second\n"
+      "  maquette bench --predict                             # a minute; novelty and frames a second\n"
       "  maquette bench --predict clip.mp4 --threads 1 --json bench.json");
   int exit_code = 0;
   app.callback([&] {

@@ -22,10 +22,10 @@ from tests.hostile.trial import EITHER, REFUSED, Trial
 PEOPLE_RUN = ("densepose", "stub:people?size=64x48&frames=2", *DENSEPOSE[3:], "--bundle", "bundle")
 SCENE_RUN = ("scene", "build", str(CAPTURE), "--bundle", "bundle", "--out", "a.maqs", "--threads", "1")
 HEAD_RUN = (*(word if word != str(HEADS_BUNDLE) else "bundle" for word in HEAD), "--out", "a.glb")
-SURPRISE_RUN = ("predict", "stub:people?size=64x48&frames=3", "--surprise", "--json", "--bundle", "bundle",
+NOVELTY_RUN = ("novelty", "stub:people?size=64x48&frames=3", "--json", "--bundle", "bundle",
                 "--threads", "1", "--out", "a.avi")  # fmt: skip
 KINDS = ((PEOPLE_BUNDLE, PEOPLE_RUN), (SCENE_BUNDLE, SCENE_RUN), (HEADS_BUNDLE, HEAD_RUN),
-         (PREDICTION_BUNDLE, SURPRISE_RUN))  # fmt: skip
+         (PREDICTION_BUNDLE, NOVELTY_RUN))  # fmt: skip
 
 
 def _copied(source: Path, changes: dict[str, bytes], is_signed: bool):

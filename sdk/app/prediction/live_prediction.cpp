@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int64_t kPatienceNs = 20000000;  // how late a change of what is wanted is seen while no frame comes
+constexpr int64_t kPatienceNs = 20000000;  // delay of a changed choice while no frame comes
 constexpr double kMaxAheadS = 10;          // of a predictor
 constexpr auto kRetryFor = std::chrono::seconds(2), kSecond = std::chrono::seconds(1);
 constexpr auto kRetryEvery = std::chrono::milliseconds(100), kCloseWithin = std::chrono::milliseconds(200);
@@ -25,21 +25,21 @@ std::string whole(double value) { return std::to_string(std::lround(value)); }
 }  // namespace
 
 std::string text_of_method(const maq_predictor_stats& stats) {
-  if (stats.method == MAQ_PREDICTION_LAST) return "last";
-  if (stats.method == MAQ_PREDICTION_MOTION) return "motion";
-  const std::string mended = stats.networks_ms > 0 ? ", mended" : "";
-  return whole(100 * double(stats.motion_fraction)) + " % motion" + mended;
+  if (stats.method == MAQ_PREDICTOR_LAST) return "last";
+  if (stats.method == MAQ_PREDICTOR_MOTION) return "motion";
+  const std::string refined = stats.method == MAQ_PREDICTOR_REFINED ? ", refined" : "";
+  return whole(100 * double(stats.motion_fraction)) + " % motion" + refined;
 }
 
-std::string text_of_next(const PredictionFrame& frame, bool has_uncertainty) {
-  const std::string text = "predicted +" + whole(frame.made_ahead_s * 1e3) + " ms, " + text_of_method(frame.stats);
-  if (!has_uncertainty) return text;
-  if (frame.drawn.number == 0) return text + "; no uncertainty yet";
-  return text + "; red: uncertain, " + whole(frame.drawn_age_ms) + " ms old";
+std::string text_of_next(const PredictionFrame& frame, bool has_entropy) {
+  const std::string text = "predicted +" + whole(frame.predicted_ahead_s * 1e3) + " ms, " + text_of_method(frame.stats);
+  if (!has_entropy) return text;
+  if (frame.sampled.number == 0) return text + "; no entropy yet";
+  return text + "; red: uncertain, " + whole(frame.sample_age_ms) + " ms old";
 }
 
-std::string text_of_drawn(const PredictionFrame& frame) {
-  return "one that may come +" + whole(frame.drawn.ahead_s * 1e3) + " ms, " + whole(frame.drawn_age_ms) + " ms old";
+std::string text_of_sample(const PredictionFrame& frame) {
+  return "sample +" + whole(frame.sampled.ahead_s * 1e3) + " ms, " + whole(frame.sample_age_ms) + " ms old";
 }
 
 LivePrediction::LivePrediction(const Context& context, const PredictionChoice& choice,
@@ -128,7 +128,7 @@ void LivePrediction::run() {
         } else if (has_pushed_) {
           const bool is_elsewhen = frame_.ahead_s != wanted.choice.ahead_s;
           if (is_elsewhen) predict(wanted.choice.ahead_s);
-          if (take_draw() || is_elsewhen) on_frame_(frame_);
+          if (take_sample() || is_elsewhen) on_frame_(frame_);
         }
       }
     } catch (const std::bad_alloc&) {
@@ -142,15 +142,15 @@ void LivePrediction::run() {
 
 void LivePrediction::close_source() {
   recorder_.reset(), recording_.clear();
-  concealer_.reset(), predictor_.reset(), surprise_.reset(), source_.reset(), draws_.reset();
-  frame_.drawn = {};
-  is_surprise_switched_ = false;
-  frame_.surprise.clear(), frame_.surprise_bits.clear();
+  concealer_.reset(), predictor_.reset(), novelty_.reset(), source_.reset(), samples_.reset();
+  frame_.sampled = {};
+  is_novelty_switched_ = false;
+  frame_.novelty.clear(), frame_.novelty_bits.clear();
   has_pushed_ = false;
   times_.clear();
 }
 
-// The one that is wanted now, which may be none.
+// Opens the source that is wanted now, which may be none.
 void LivePrediction::open_source() {
   close_source();
   std::string uri;
@@ -195,7 +195,7 @@ void LivePrediction::open_source() {
   enter(MAQ_PIPELINE_RUNNING, std::exchange(fallback_reason_, ""));
 }
 
-// What is wanted and not so yet.
+// Applies the choices that changed.
 void LivePrediction::apply(const Wanted& wanted) {
   if (recording_ != wanted.recording) {
     recorder_.reset();
@@ -206,41 +206,40 @@ void LivePrediction::apply(const Wanted& wanted) {
   }
   const PredictionChoice& choice = wanted.choice;
   if (!predictor_ || method_ != choice.method) switch_method(choice);
-  const bool bridges = choice.bridges_gaps && source_->info().is_live == 1;
-  if (bridges && !concealer_) concealer_.emplace(context_, *source_);
-  if (!bridges) concealer_.reset();
-  if (is_surprise_switched_ != choice.finds_surprise) switch_surprise(choice);
-  switch_draws(choice);
+  const bool conceals = choice.conceals_gaps && source_->info().is_live == 1;
+  if (conceals && !concealer_) concealer_.emplace(context_, *source_);
+  if (!conceals) concealer_.reset();
+  if (is_novelty_switched_ != choice.scores_novelty) switch_novelty(choice);
+  switch_samples(choice);
 }
 
-// Without its network the picture is that of MAQ_PREDICTION_AUTO.
+// Falls back to MAQ_PREDICTOR_AUTO if the bundle lacks the network.
 void LivePrediction::switch_method(const PredictionChoice& choice) {
   maq_predictor_config config = default_predictor_config();
   config.method = method_ = choice.method;
-  config.network_mode = MAQ_NETWORK_MENDED;
-  if (!choice.bundle.empty()) config.bundle_path = choice.bundle.c_str();
+  if (!choice.bundle.empty()) config.model.bundle_path = choice.bundle.c_str();
   try {
     predictor_.emplace(context_, config);
   } catch (const Error& error) {
-    if (config.method != MAQ_PREDICTION_NETWORK) throw;
-    config.method = MAQ_PREDICTION_AUTO;
+    if (config.method != MAQ_PREDICTOR_REFINED) throw;
+    config.method = MAQ_PREDICTOR_AUTO;
     predictor_.emplace(context_, config);
     enter(MAQ_PIPELINE_RUNNING, error.what());
   }
   has_pushed_ = false;
 }
 
-// They begin with the frames that come from then on.
-void LivePrediction::switch_draws(const PredictionChoice& choice) {
-  const DrawChoice drawing = {choice.ahead_s, choice.draws_sample};
-  if (!choice.finds_uncertainty && !choice.draws_sample) {
-    draws_.reset();
-    frame_.drawn = {};
-  } else if (draws_) {
-    draws_->set_choice(drawing);
+// Samples begin with the next frames.
+void LivePrediction::switch_samples(const PredictionChoice& choice) {
+  const SampleChoice sampling = {choice.ahead_s, choice.shows_sample};
+  if (!choice.shows_entropy && !choice.shows_sample) {
+    samples_.reset();
+    frame_.sampled = {};
+  } else if (samples_) {
+    samples_->set_choice(sampling);
   } else {
-    has_draw_problem_ = false;
-    draws_.emplace(context_, choice.bundle, drawing, options_.real_time, [this] {
+    has_sample_problem_ = false;
+    samples_.emplace(context_, choice.bundle, sampling, options_.real_time, [this] {
       const std::lock_guard<std::mutex> lock(mutex_);
       is_changed_ = true;
       wake_.notify_one();
@@ -248,40 +247,40 @@ void LivePrediction::switch_draws(const PredictionChoice& choice) {
   }
 }
 
-// Where there is a newer one. Without its networks the picture goes on.
-bool LivePrediction::take_draw() {
-  if (!draws_) return false;
-  const std::string problem = draws_->problem();
-  if (!problem.empty() && !std::exchange(has_draw_problem_, true)) {
+// Takes a newer sample if there is one. Without networks, the image goes on.
+bool LivePrediction::take_sample() {
+  if (!samples_) return false;
+  const std::string problem = samples_->problem();
+  if (!problem.empty() && !std::exchange(has_sample_problem_, true)) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       status_.problem = problem;
     }
     if (on_change_) on_change_();
   }
-  const bool is_newer = draws_->take(frame_.drawn);
-  if (frame_.drawn.number > 0) frame_.drawn_age_ms = double(shown_ns_ - frame_.drawn.timestamp_ns) / 1e6;
-  frame_.drawn_freshness = std::clamp((kStaleMs - frame_.drawn_age_ms) / (kStaleMs - kFreshMs), 0.0, 1.0);
+  const bool is_newer = samples_->take(frame_.sampled);
+  if (frame_.sampled.number > 0) frame_.sample_age_ms = double(shown_ns_ - frame_.sampled.timestamp_ns) / 1e6;
+  frame_.sample_freshness = std::clamp((kStaleMs - frame_.sample_age_ms) / (kStaleMs - kFreshMs), 0.0, 1.0);
   return is_newer;
 }
 
-// Without its network the picture goes on.
-void LivePrediction::switch_surprise(const PredictionChoice& choice) {
-  is_surprise_switched_ = choice.finds_surprise;
-  surprise_.reset();
-  frame_.surprise.clear(), frame_.surprise_bits.clear();
-  if (!choice.finds_surprise) return;
-  maq_surprise_config config = default_surprise_config();
-  if (!choice.bundle.empty()) config.bundle_path = choice.bundle.c_str();
-  config.allow_spinning = 0;
+// Without its network, the image goes on.
+void LivePrediction::switch_novelty(const PredictionChoice& choice) {
+  is_novelty_switched_ = choice.scores_novelty;
+  novelty_.reset();
+  frame_.novelty.clear(), frame_.novelty_bits.clear();
+  if (!choice.scores_novelty) return;
+  maq_novelty_config config = default_novelty_config();
+  if (!choice.bundle.empty()) config.model.bundle_path = choice.bundle.c_str();
+  config.model.spinning = MAQ_SPINNING_OFF;
   try {
-    surprise_.emplace(context_, config);
+    novelty_.emplace(context_, config);
   } catch (const Error& error) {
     enter(MAQ_PIPELINE_RUNNING, error.what());
   }
 }
 
-// Where the disk is full, the picture goes on.
+// When the disk is full, the image goes on.
 void LivePrediction::record(const std::function<void()>& step) {
   try {
     step();
@@ -291,13 +290,13 @@ void LivePrediction::record(const std::function<void()>& step) {
   }
 }
 
-void LivePrediction::find_surprise(const Frame& frame) {
+void LivePrediction::score_novelty(const Frame& frame) {
   const int64_t timestamp_ns = frame.desc().timestamp_ns;
-  if (frame_.surprise.empty()) first_ns_ = timestamp_ns;
-  frame_.surprise.push_back({surprise_->push(frame), double(timestamp_ns - first_ns_) / 1e9});
-  if (frame_.surprise.size() > kMaxMomentsKept) frame_.surprise.pop_front();
-  frame_.surprise_bits = surprise_->map();
-  frame_.surprise_ms = double(surprise_->stats().push_ms);
+  if (frame_.novelty.empty()) first_ns_ = timestamp_ns;
+  frame_.novelty.push_back({novelty_->push(frame), double(timestamp_ns - first_ns_) / 1e9});
+  if (frame_.novelty.size() > kMaxMomentsKept) frame_.novelty.pop_front();
+  frame_.novelty_bits = novelty_->map();
+  frame_.novelty_ms = double(novelty_->stats().push_ms);
 }
 
 void LivePrediction::play_frame(const Wanted& wanted) {
@@ -318,25 +317,25 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
   const maq_frame_desc desc = frame.desc();
   frame_.origin = frame.origin();
   shown_ns_ = desc.timestamp_ns;
-  // What was made up says nothing new.
+  // A predicted frame has no news.
   if (frame_.origin.kind != MAQ_FRAME_PREDICTED || !has_pushed_) {
     record([&] {
       if (recorder_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) recorder_->add(frame);
     });
     predictor_->push(frame);
-    if (surprise_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) find_surprise(frame);
-    if (draws_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) {
-      draws_->push(frame);
-      if (!options_.real_time) draws_->wait();
+    if (novelty_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) score_novelty(frame);
+    if (samples_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) {
+      samples_->push(frame);
+      if (!options_.real_time) samples_->wait();
     }
     pushed_ns_ = shown_ns_;
     has_pushed_ = true;
   }
   frame_.now.copy_from(frame);
-  frame_.bridges_gaps = concealer_.has_value();
+  frame_.conceals_gaps = concealer_.has_value();
   frame_.gaps = concealer_ ? concealer_->stats() : maq_concealer_stats{};
   predict(wanted.choice.ahead_s);
-  take_draw();
+  take_sample();
   const Clock::time_point now = Clock::now();
   times_.push_back(now);
   while (now - times_.front() > kSecond) times_.pop_front();
@@ -353,12 +352,12 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
 
 void LivePrediction::predict(double ahead_s) {
   frame_.ahead_s = ahead_s;
-  frame_.made_ahead_s = std::clamp(ahead_s + double(shown_ns_ - pushed_ns_) / 1e9, 0.0, kMaxAheadS);
-  frame_.next.copy_from(predictor_->predict(frame_.made_ahead_s));
+  frame_.predicted_ahead_s = std::clamp(ahead_s + double(shown_ns_ - pushed_ns_) / 1e9, 0.0, kMaxAheadS);
+  frame_.next.copy_from(predictor_->predict(frame_.predicted_ahead_s));
   frame_.stats = predictor_->stats();
 }
 
-// There will be no more frames, of the source or at all.
+// Ends the source; no more frames come.
 void LivePrediction::end(const std::string& problem) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -369,7 +368,7 @@ void LivePrediction::end(const std::string& problem) {
   enter(problem.empty() ? MAQ_PIPELINE_ENDED : MAQ_PIPELINE_FAILED, problem);
 }
 
-// `problem`: "" leaves what was said before.
+// `problem`: "" keeps the text from before.
 void LivePrediction::enter(maq_pipeline_state state, const std::string& problem) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -382,7 +381,7 @@ void LivePrediction::enter(maq_pipeline_state state, const std::string& problem)
   if (on_change_) on_change_();
 }
 
-// On a thread of the source.
+// Called on a thread of the source.
 void LivePrediction::take_camera_state(maq_source_state state, const char* reason) {
   if (state == MAQ_SOURCE_STARTED || state == MAQ_SOURCE_RECONNECTING) return;
   if (state == MAQ_SOURCE_RECONNECTED) {

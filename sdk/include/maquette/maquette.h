@@ -87,6 +87,7 @@
 #endif
 #if MAQ_HAS_PREDICTION
 #include "maquette/concealer.h"
+#include "maquette/novelty.h"
 #include "maquette/prediction.h"
 #include "maquette/prediction_model.h"
 #endif

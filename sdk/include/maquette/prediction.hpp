@@ -1,5 +1,4 @@
-// What a stream will show next, how surprising what it shows is, and live sources with short gaps bridged, for C++17; a
-// part of maquette.hpp.
+// Predicted frames, novelty, and live sources with short gaps filled, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_PREDICTION_HPP_
 #define MAQUETTE_PREDICTION_HPP_
 
@@ -9,6 +8,7 @@
 
 #include "maquette/concealer.h"
 #include "maquette/frame.hpp"
+#include "maquette/novelty.h"
 #include "maquette/prediction.h"
 #include "maquette/source.hpp"
 
@@ -23,9 +23,9 @@ inline maq_predictor_config default_predictor_config() {
 class Predictor {
  public:
   explicit Predictor(const Context& context, const maq_predictor_config& config = default_predictor_config()) {
-    maq_predictor* made = nullptr;
-    check(maq_predictor_create(context.get(), &config, &made));
-    owner_.reset(made);
+    maq_predictor* created = nullptr;
+    check(maq_predictor_create(context.get(), &config, &created));
+    owner_.reset(created);
   }
 
   maq_predictor* get() const { return owner_.get(); }
@@ -33,27 +33,31 @@ class Predictor {
   void push(const Frame& frame) { check(maq_predictor_push(get(), frame.get())); }
 
   Frame predict(double ahead_s) {
-    maq_frame* made = nullptr;
-    check(maq_predictor_predict(get(), ahead_s, &made));
-    return Frame(made);
+    maq_frame* frame = nullptr;
+    check(maq_predictor_predict(get(), ahead_s, &frame));
+    return Frame(frame);
   }
 
-  // maq_predictor_draw; then frame `number`, from 1, of each sample, from 0, and its uncertainty by cell.
-  void draw(uint32_t sample_count, uint32_t frame_count, double step_s) {
-    check(maq_predictor_draw(get(), sample_count, frame_count, step_s));
+  // Samples several futures. Then acquire_sample() decodes frame `frame_index` (1-based) of sample `sample_index`
+  // (0-based), and entropy_map() returns its entropy in bits, one value per cell.
+  void sample(uint32_t sample_count, uint32_t frame_count, double step_s) {
+    check(maq_predictor_sample(get(), sample_count, frame_count, step_s));
   }
 
-  Frame drawn(uint32_t sample, uint32_t number) {
-    maq_frame* made = nullptr;
-    check(maq_predictor_acquire_drawn(get(), sample, number, &made));
-    return Frame(made);
+  Frame acquire_sample(uint32_t sample_index, uint32_t frame_index) {
+    maq_frame* frame = nullptr;
+    check(maq_predictor_acquire_sample(get(), sample_index, frame_index, &frame));
+    return Frame(frame);
   }
 
-  std::vector<float> uncertainty(uint32_t sample, uint32_t number) const {
+  std::vector<float> entropy_map(uint32_t sample_index, uint32_t frame_index) const {
     std::vector<float> bits(stats().cell_count);
-    check(maq_predictor_copy_uncertainty(get(), sample, number, bits.data(), bits.size()));
+    check(maq_predictor_copy_entropy_map(get(), sample_index, frame_index, bits.data(), bits.size()));
     return bits;
   }
+
+  // From any thread.
+  void cancel() { check(maq_predictor_cancel(get())); }
 
   void reset() { check(maq_predictor_reset(get())); }
 
@@ -68,55 +72,55 @@ class Predictor {
   Owner<maq_predictor, maq_predictor_destroy> owner_;
 };
 
-inline maq_surprise_config default_surprise_config() {
-  maq_surprise_config config;
-  check(maq_surprise_config_init(&config, sizeof config));
+inline maq_novelty_config default_novelty_config() {
+  maq_novelty_config config;
+  check(maq_novelty_config_init(&config, sizeof config));
   return config;
 }
 
-// How surprising the frames of one stream are. Several share networks by networks_of of their configs.
-class Surprise {
+// Scores the frames of one stream. Streams share networks by `shared_with` of their configs.
+class Novelty {
  public:
-  explicit Surprise(const Context& context, const maq_surprise_config& config = default_surprise_config()) {
-    maq_surprise* made = nullptr;
-    check(maq_surprise_create(context.get(), &config, &made));
-    owner_.reset(made);
+  explicit Novelty(const Context& context, const maq_novelty_config& config = default_novelty_config()) {
+    maq_novelty* created = nullptr;
+    check(maq_novelty_create(context.get(), &config, &created));
+    owner_.reset(created);
   }
 
-  maq_surprise* get() const { return owner_.get(); }
+  maq_novelty* get() const { return owner_.get(); }
 
-  maq_surprise_score push(const Frame& frame) {
+  maq_novelty_score push(const Frame& frame) {
     score_.struct_size = sizeof score_;
-    check(maq_surprise_push(get(), frame.get(), &score_));
+    check(maq_novelty_push(get(), frame.get(), &score_));
     return score_;
   }
 
-  // Of the latest frame: score.rows rows of score.columns cells.
+  // Returns the map of the latest frame: score.rows rows of score.columns cells.
   std::vector<float> map() const {
     std::vector<float> bits(size_t(score_.columns) * size_t(score_.rows));
-    check(maq_surprise_copy_map(get(), bits.data(), bits.size()));
+    check(maq_novelty_copy_map(get(), bits.data(), bits.size()));
     return bits;
   }
 
-  // What the network saw of the latest frame.
-  Frame rebuilt() {
-    maq_frame* made = nullptr;
-    check(maq_surprise_acquire_rebuilt(get(), &made));
-    return Frame(made);
+  // Decodes the codes of the latest frame.
+  Frame reconstruction() {
+    maq_frame* frame = nullptr;
+    check(maq_novelty_acquire_reconstruction(get(), &frame));
+    return Frame(frame);
   }
 
-  void reset() { check(maq_surprise_reset(get())); }
+  void reset() { check(maq_novelty_reset(get())); }
 
-  maq_surprise_stats stats() const {
-    maq_surprise_stats stats{};
+  maq_novelty_stats stats() const {
+    maq_novelty_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_surprise_get_stats(get(), &stats));
+    check(maq_novelty_get_stats(get(), &stats));
     return stats;
   }
 
  private:
-  Owner<maq_surprise, maq_surprise_destroy> owner_;
-  maq_surprise_score score_{};
+  Owner<maq_novelty, maq_novelty_destroy> owner_;
+  maq_novelty_score score_{};
 };
 
 inline maq_concealer_config default_concealer_config() {
@@ -125,18 +129,18 @@ inline maq_concealer_config default_concealer_config() {
   return config;
 }
 
-// The frames of a live source with its short gaps bridged; Frame::is_predicted tells which were made up.
+// Delivers the frames of a live source with its short gaps filled. Frame::is_predicted tells predicted frames apart.
 class Concealer {
  public:
   Concealer(const Context& context, Source& source, const maq_concealer_config& config = default_concealer_config()) {
-    maq_concealer* made = nullptr;
-    check(maq_concealer_create(context.get(), source.get(), &config, &made));
-    owner_.reset(made);
+    maq_concealer* created = nullptr;
+    check(maq_concealer_create(context.get(), source.get(), &config, &created));
+    owner_.reset(created);
   }
 
   maq_concealer* get() const { return owner_.get(); }
 
-  // As Source::next.
+  // Like Source::next.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
     maq_frame* frame = nullptr;
     const maq_status status = maq_concealer_acquire_frame(get(), timeout_ns, &frame);

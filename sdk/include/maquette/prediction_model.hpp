@@ -12,12 +12,12 @@ namespace maquette {
 
 class PredictionModel : public Model {
  public:
-  // `surprise` null: novelty is not scored.
+  // `novelty` null: novelty is not scored.
   PredictionModel(const Context& context, const Predictor& predictor, double ahead_s,
-                  const Surprise* surprise = nullptr) {
+                  const Novelty* novelty = nullptr) {
     maq_model* made = nullptr;
     check(maq_prediction_model_create(context.get(), predictor.get(), ahead_s,
-                                      surprise != nullptr ? surprise->get() : nullptr, &made));
+                                      novelty != nullptr ? novelty->get() : nullptr, &made));
     own(made);
   }
 };
@@ -30,8 +30,8 @@ inline std::optional<Frame> predicted_frame_of(const PipelineResult& result) {
 }
 
 // Nothing if the model does not score novelty.
-inline std::optional<maq_surprise_score> novelty_of(const PipelineResult& result) {
-  maq_surprise_score score{};
+inline std::optional<maq_novelty_score> novelty_of(const PipelineResult& result) {
+  maq_novelty_score score{};
   score.struct_size = sizeof score;
   const maq_status status = maq_pipeline_result_get_novelty(result.get(), &score);
   if (status == MAQ_ERROR_NOT_FOUND) return std::nullopt;

@@ -57,7 +57,7 @@ class HandleOf : public Handle {
   static void operator delete(void* memory) noexcept { HandleState::retire(memory, kind); }
 };
 
-class PredictorWorkspaces;
+class MotionWorkspaces;
 
 // What the objects made from a context keep of it when it is destroyed before them.
 class ContextState {
@@ -65,8 +65,8 @@ class ContextState {
   ContextState(Log log, std::string onnxruntime_path) : log_(log), onnxruntime_path_(std::move(onnxruntime_path)) {}
 
   const Log& log() const { return log_; }
-  // Memory that the predictors of the context share, made at the first call. In builds with prediction.
-  std::shared_ptr<PredictorWorkspaces> predictor_workspaces() const;
+  // Returns the scratch memory of the context's predictors, made at the first call. In builds with prediction.
+  std::shared_ptr<MotionWorkspaces> motion_workspaces() const;
 
   // Opens the library at the first call; tries again after a failure.
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime() {
@@ -79,7 +79,7 @@ class ContextState {
   Log log_;
   std::string onnxruntime_path_;
   mutable std::mutex mutex_;
-  mutable std::shared_ptr<PredictorWorkspaces> predictor_workspaces_;
+  mutable std::shared_ptr<MotionWorkspaces> motion_workspaces_;
   std::shared_ptr<const OnnxRuntimeLibrary> onnxruntime_;
 };
 

@@ -20,7 +20,7 @@ constexpr const char* kKinds[] = {
     "a maq_capture",      "a maq_scene",         "a maq_scene_builder", "a maq_scene_renderer",   "a maq_scene_image",
     "a maq_edges",        "a maq_edges_result",  "a maq_edges_curves",  "a maq_edges_fusion",     "a maq_head",
     "a maq_head_builder", "a maq_head_renderer", "a maq_head_image",    "a maq_predictor",        "a maq_concealer",
-    "a maq_surprise",     "a maq_model",         "a maq_pipeline_result"};
+    "a maq_novelty",     "a maq_model",         "a maq_pipeline_result"};
 static_assert(std::size(kKinds) == size_t(HandleKind::kPipelineResult) + 1);
 
 // The latest handles that are gone. Without a destructor: an app may destroy handles while the process ends.

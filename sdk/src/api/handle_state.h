@@ -35,7 +35,7 @@ enum class HandleKind : uint32_t {
   kHeadImage,
   kPredictor,
   kConcealer,
-  kSurprise,
+  kNovelty,
   kModel,
   kPipelineResult
 };

@@ -43,7 +43,7 @@ struct Concealer::State {
   ConcealerStats counts;
 
   // The thread alone uses these.
-  Predictor predictor;
+  MotionPredictor predictor;
   Frame captured, made_up;
   bool has_made_up = false;                       // `made_up` is there for the next frame that does not come
   int64_t period_ns = 0;                          // between frames; 0: not known yet
@@ -57,7 +57,7 @@ struct Concealer::State {
   std::thread thread;
 
   State(std::shared_ptr<Source> of, const ConcealerSettings& settings)
-      : source(std::move(of)), max_gap_ns(int64_t(settings.max_gap_ms) * 1000000), predictor(settings.predictor) {
+      : source(std::move(of)), max_gap_ns(int64_t(settings.max_gap_ms) * 1000000), predictor(settings.motion) {
     const double fps = source->info().fps;
     if (fps > 0) period_ns = std::clamp(int64_t(1e9 / fps), kMinPeriod_ns, kMaxPeriod_ns);
   }
@@ -153,7 +153,7 @@ struct Concealer::State {
   void prepare() {
     const int64_t ahead_ns = (steps + 1) * period_ns;
     has_made_up = period_ns > 0 && ahead_ns <= max_gap_ns;
-    if (has_made_up) predictor.predict(std::min(ahead_ns, Predictor::kMaxAhead_ns), made_up);
+    if (has_made_up) predictor.predict(std::min(ahead_ns, MotionPredictor::kMaxAhead_ns), made_up);
   }
 
   void give_made_up() {

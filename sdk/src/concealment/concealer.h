@@ -6,13 +6,13 @@
 #include <memory>
 
 #include "core/frame.h"
-#include "prediction/predictor.h"
+#include "prediction/blend/motion_predictor.h"
 #include "sources/source.h"
 
 namespace maq {
 
 struct ConcealerSettings {
-  PredictorSettings predictor;
+  MotionSettings motion;
   int max_gap_ms = 300;
 };
 

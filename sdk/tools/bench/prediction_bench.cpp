@@ -23,18 +23,18 @@ namespace {
 
 constexpr const char* kPredictionSchema = "maquette-bench-prediction-1";
 constexpr double kMibibytes = 1024.0 * 1024.0;
-// A block of a case goes through one stretch of the stream, the same for all: frames that are shown first, for a
-// network sees several, then those that are measured, or as many as fit into so much time.
+// A block of a case runs over the same stretch of frames as the others. The first frames are not measured, as networks
+// see several frames; then up to kMeasuredInBlock are, within kBlockMs.
 constexpr size_t kShownFirst = 6, kMeasuredInBlock = 10;
 constexpr double kBlockMs = 300;
-constexpr int32_t kNetworkSidePx = 64;  // of the square that networks see
-constexpr uint32_t kFramesDrawn = 11;   // as benchmarks/sampling
-constexpr double kMaxStepS = 0.125;     // of maq_predictor_draw
+constexpr int32_t kNetworkSidePx = 64;   // of the networks' input
+constexpr uint32_t kFramesSampled = 11;  // as in the benchmarks
+constexpr double kMaxStepS = 0.125;      // of maq_predictor_sample
 
 using Clock = std::chrono::steady_clock;
 using OrderedJson = nlohmann::ordered_json;
 
-// Consecutive frames of a source, and the same at the size of the networks, in memory.
+// Consecutive frames of a source in memory, and the same at the size of the networks.
 struct Stretch {
   std::vector<maquette::Frame> frames, small_frames;
   double step_s = 0;
@@ -65,7 +65,7 @@ Stretch read_stretch(const maquette::Context& context, const std::string& text) 
   return stretch;
 }
 
-// What is measured: what it does with a frame, and how long the stages of that took.
+// One measured case: its work for a frame, and the times of its stages.
 class PredictionCase {
  public:
   PredictionCase(const char* name, std::vector<const char*> stages) : name_(name), times_(std::move(stages)) {}
@@ -83,7 +83,7 @@ class PredictionCase {
   }
   virtual void add_settings(OrderedJson* json) const = 0;
 
-  // One stretch from its beginning; counts no run where `counts` says so.
+  // Runs one stretch from its beginning. Counts the runs only with `counts`.
   void run_block(const Stretch& stretch, bool counts) {
     const auto& frames = sees_small_frames() ? stretch.small_frames : stretch.frames;
     reset();
@@ -100,7 +100,7 @@ class PredictionCase {
   }
 
  protected:
-  void count_resting() { ++resting_; }  // a frame of which a network ought to make something, and did not
+  void count_resting() { ++resting_; }  // a frame for which no network ran
 
  private:
   virtual void reset() = 0;
@@ -112,44 +112,44 @@ class PredictionCase {
   int resting_ = 0;
 };
 
-class SurpriseCase final : public PredictionCase {
+class NoveltyCase final : public PredictionCase {
  public:
-  SurpriseCase(const char* name, const maquette::Context& context, const maq_surprise_config& config)
+  NoveltyCase(const char* name, const maquette::Context& context, const maq_novelty_config& config)
       : PredictionCase(name, {"resize", "encoder", "nearest", "likelihood", "map", "frame"}),
-        surprise_(context, config) {}
+        novelty_(context, config) {}
 
-  void add_settings(OrderedJson* json) const override { (*json)["threads"] = surprise_.stats().threads; }
-  const maquette::Surprise& surprise() const { return surprise_; }
+  void add_settings(OrderedJson* json) const override { (*json)["threads"] = novelty_.stats().threads; }
+  const maquette::Novelty& novelty() const { return novelty_; }
 
  private:
-  void reset() override { surprise_.reset(); }
-  void show(const maquette::Frame& frame) override { surprise_.push(frame); }
+  void reset() override { novelty_.reset(); }
+  void show(const maquette::Frame& frame) override { novelty_.push(frame); }
   std::vector<double> run(const maquette::Frame& frame, double) override {
-    surprise_.push(frame);
+    novelty_.push(frame);
     const auto pushed = Clock::now();
-    surprise_.map();
+    novelty_.map();
     const double map_ms = ms_between(pushed, Clock::now());
-    const maq_surprise_stats stats = surprise_.stats();
+    const maq_novelty_stats stats = novelty_.stats();
     return {stats.resize_ms, stats.network_ms, stats.nearest_ms, stats.transformer_ms, map_ms};
   }
 
-  maquette::Surprise surprise_;
+  maquette::Novelty novelty_;
 };
 
-// A frame is pushed, and the next one made of it, without drawing.
-class PictureCase final : public PredictionCase {
+// Pushes a frame and predicts the next one, without sampling.
+class FrameCase final : public PredictionCase {
  public:
-  PictureCase(const char* name, const maquette::Context& context, const maq_predictor_config& config)
+  FrameCase(const char* name, const maquette::Context& context, const maq_predictor_config& config)
       : PredictionCase(name, stages_of(config)),
         predictor_(context, config),
-        has_network_(config.method == MAQ_PREDICTION_NETWORK) {}
+        has_network_(config.method == MAQ_PREDICTOR_REFINED) {}
 
   void add_settings(OrderedJson*) const override {}
 
  private:
   static std::vector<const char*> stages_of(const maq_predictor_config& config) {
-    std::vector<const char*> stages{"brightness", "motion", "choice", "move_on", "pixels"};
-    if (config.method == MAQ_PREDICTION_NETWORK) stages.push_back("network");
+    std::vector<const char*> stages{"luma", "flow", "weights", "project", "warp"};
+    if (config.method == MAQ_PREDICTOR_REFINED) stages.push_back("network");
     stages.push_back("frame");
     return stages;
   }
@@ -159,7 +159,7 @@ class PictureCase final : public PredictionCase {
     predictor_.push(frame);
     predictor_.predict(step_s);
     const maq_predictor_stats stats = predictor_.stats();
-    std::vector<double> ms{stats.grey_ms, stats.flow_ms, stats.choice_ms, stats.project_ms, stats.fetch_ms};
+    std::vector<double> ms{stats.luma_ms, stats.flow_ms, stats.weights_ms, stats.project_ms, stats.warp_ms};
     if (has_network_) ms.push_back(stats.networks_ms);
     if (has_network_ && stats.networks_ms == 0) count_resting();
     return ms;
@@ -169,22 +169,20 @@ class PictureCase final : public PredictionCase {
   const bool has_network_;
 };
 
-// A frame is pushed, samples of what comes are drawn by networks, and the last picture of one is made.
-class DrawnCase final : public PredictionCase {
+// Pushes a frame, samples futures, and decodes the last frame of one.
+class SampledCase final : public PredictionCase {
  public:
-  DrawnCase(const char* name, const maquette::Context& context, const maq_predictor_config& config, uint32_t samples,
-            uint32_t frames)
-      : PredictionCase(name, {"push", "draw", "picture", "frame"}),
+  SampledCase(const char* name, const maquette::Context& context, const maq_predictor_config& config, uint32_t samples,
+              uint32_t frames)
+      : PredictionCase(name, {"push", "sample", "decode", "frame"}),
         predictor_(context, config),
-        passes_(config.passes),
         samples_(samples),
         frames_(frames) {}
 
   bool sees_small_frames() const override { return true; }
   void add_settings(OrderedJson* json) const override {
     (*json)["samples"] = samples_;
-    (*json)["frames_drawn"] = frames_;
-    (*json)["passes"] = passes_;
+    (*json)["sampled_frames"] = frames_;
   }
   const maquette::Predictor& predictor() const { return predictor_; }
 
@@ -195,72 +193,77 @@ class DrawnCase final : public PredictionCase {
     const auto begin = Clock::now();
     predictor_.push(frame);
     const auto pushed = Clock::now();
-    predictor_.draw(samples_, frames_, step_s);
-    const auto drawn = Clock::now();
-    if (predictor_.stats().drawn_count == 0) count_resting();
-    predictor_.drawn(samples_ - 1, frames_);
-    return {ms_between(begin, pushed), ms_between(pushed, drawn), ms_between(drawn, Clock::now())};
+    predictor_.sample(samples_, frames_, step_s);
+    const auto sampled = Clock::now();
+    if (predictor_.stats().sampled_frame_count == 0) count_resting();
+    predictor_.acquire_sample(samples_ - 1, frames_);
+    return {ms_between(begin, pushed), ms_between(pushed, sampled), ms_between(sampled, Clock::now())};
   }
 
   maquette::Predictor predictor_;
-  const uint32_t passes_, samples_, frames_;
+  const uint32_t samples_, frames_;
 };
 
 using Cases = std::vector<std::unique_ptr<PredictionCase>>;
 
-// Networks are shared: those of surprise by its two cases, those that draw by all of theirs. `left_out`: sentences on
-// what the bundle does not have.
+// Both share their networks.
+void add_novelty_cases(const maquette::Context& context, const PredictionBenchOptions& options,
+                       const std::string& bundle, Cases* cases) {
+  maq_novelty_config config = maquette::default_novelty_config();
+  if (!bundle.empty()) config.model.bundle_path = bundle.c_str();
+  config.model.threads = options.threads;
+  auto transformer = std::make_unique<NoveltyCase>("novelty", context, config);
+  config.shared_with = transformer->novelty().get();
+  config.method = MAQ_NOVELTY_BIGRAM;
+  auto bigram = std::make_unique<NoveltyCase>("novelty by bigrams", context, config);
+  cases->push_back(std::move(transformer));
+  cases->push_back(std::move(bigram));
+}
+
+// All share their networks.
+void add_sampled_cases(const maquette::Context& context, maq_predictor_config config, Cases* cases) {
+  config.method = MAQ_PREDICTOR_SAMPLED;
+  config.temperature = 1;
+  struct Sampling {
+    const char* name;
+    uint32_t samples, frames;
+  };
+  const Sampling samplings[] = {{"next, sampled", 1, 1},
+                                {"11 sampled, 1 sample", 1, kFramesSampled},
+                                {"11 sampled, 4 samples", 4, kFramesSampled}};
+  for (const Sampling& sampling : samplings) {
+    auto sampled = std::make_unique<SampledCase>(sampling.name, context, config, sampling.samples, sampling.frames);
+    if (config.shared_with == nullptr) config.shared_with = sampled->predictor().get();
+    cases->push_back(std::move(sampled));
+  }
+}
+
+// Adds the reason to `left_out` if the bundle has no network for `add`.
+template <class Add>
+void add_if_supported(const Add& add, const char* reason, std::vector<std::string>* left_out) {
+  try {
+    add();
+  } catch (const maquette::Error& error) {
+    if (error.status() != MAQ_ERROR_UNSUPPORTED) throw;
+    left_out->push_back(std::string(reason) + ": " + error.what());
+  }
+}
+
 Cases make_cases(const maquette::Context& context, const PredictionBenchOptions& options, const std::string& bundle,
                  std::vector<std::string>* left_out) {
   Cases cases;
-  maq_surprise_config surprise = maquette::default_surprise_config();
-  if (!bundle.empty()) surprise.bundle_path = bundle.c_str();
-  surprise.threads = options.threads;
-  auto first = std::make_unique<SurpriseCase>("surprise", context, surprise);
-  surprise.networks_of = first->surprise().get();
-  surprise.method = MAQ_SURPRISE_TABLE;
-  auto by_table = std::make_unique<SurpriseCase>("surprise by the table", context, surprise);
-  cases.push_back(std::move(first));
-  cases.push_back(std::move(by_table));
-
+  add_novelty_cases(context, options, bundle, &cases);
   maq_predictor_config predictor = maquette::default_predictor_config();
-  predictor.threads = options.threads;
-  predictor.method = MAQ_PREDICTION_MOTION;
-  cases.push_back(std::make_unique<PictureCase>("next by motion", context, predictor));
-  predictor.method = MAQ_PREDICTION_AUTO;
-  cases.push_back(std::make_unique<PictureCase>("next by auto", context, predictor));
-
-  if (!bundle.empty()) predictor.bundle_path = bundle.c_str();
-  predictor.method = MAQ_PREDICTION_NETWORK;
-  predictor.network_mode = MAQ_NETWORK_MENDED;
-  try {
-    cases.push_back(std::make_unique<PictureCase>("next by auto, mended", context, predictor));
-  } catch (const maquette::Error& error) {
-    if (error.status() != MAQ_ERROR_UNSUPPORTED) throw;
-    left_out->push_back(std::string("Nothing is mended: ") + error.what());
-  }
-  predictor.network_mode = MAQ_NETWORK_DRAWN;
-  predictor.temperature = 1;
-  struct Drawing {
-    const char* name;
-    uint32_t passes, samples, frames;
+  predictor.model.threads = options.threads;
+  if (!bundle.empty()) predictor.model.bundle_path = bundle.c_str();
+  const auto add_frame_case = [&](const char* name, maq_predictor_method method) {
+    predictor.method = method;
+    cases.push_back(std::make_unique<FrameCase>(name, context, predictor));
   };
-  const Drawing drawings[] = {{"next drawn, 1 pass", 1, 1, 1},
-                              {"next drawn, 4 passes", 4, 1, 1},
-                              {"next drawn, code after code", 0, 1, 1},
-                              {"11 drawn, 1 sample", 0, 1, kFramesDrawn},
-                              {"11 drawn, 4 samples", 0, 4, kFramesDrawn}};
-  try {
-    for (const Drawing& drawing : drawings) {
-      predictor.passes = drawing.passes;
-      auto drawn = std::make_unique<DrawnCase>(drawing.name, context, predictor, drawing.samples, drawing.frames);
-      if (predictor.networks_of == nullptr) predictor.networks_of = drawn->predictor().get();
-      cases.push_back(std::move(drawn));
-    }
-  } catch (const maquette::Error& error) {
-    if (error.status() != MAQ_ERROR_UNSUPPORTED) throw;
-    left_out->push_back(std::string("Frames are not drawn: ") + error.what());
-  }
+  add_frame_case("next, motion", MAQ_PREDICTOR_MOTION);
+  add_frame_case("next, auto", MAQ_PREDICTOR_AUTO);
+  add_if_supported([&] { add_frame_case("next, refined", MAQ_PREDICTOR_REFINED); }, "No frame is refined", left_out);
+  add_if_supported([&] { add_sampled_cases(context, predictor, &cases); }, "No frame is sampled", left_out);
   return cases;
 }
 
@@ -276,12 +279,12 @@ void print_cases(const Cases& cases) {
   }
 }
 
-// How many times as long four samples take as one; nothing where they were not measured.
+// Returns the time of four samples divided by the time of one; nothing if they were not measured.
 std::optional<double> four_samples_times(const Cases& cases) {
   const auto named = [&](const std::string& name) {
     return std::find_if(cases.begin(), cases.end(), [&](const auto& timed) { return timed->name() == name; });
   };
-  const auto one = named("11 drawn, 1 sample"), four = named("11 drawn, 4 samples");
+  const auto one = named("11 sampled, 1 sample"), four = named("11 sampled, 4 samples");
   if (one == cases.end() || four == cases.end() || (*one)->times().runs() == 0) return std::nullopt;
   return (*four)->times().median_ms() / std::max(1e-6, (*one)->times().median_ms());
 }
@@ -303,6 +306,78 @@ OrderedJson json_of(const PredictionCase& timed, const Stretch& stretch, const P
   return json;
 }
 
+void measure(const Cases& cases, const Stretch& stretch, const PredictionBenchOptions& options) {
+  const auto is_unfinished = [&](const PredictionCase& timed) {
+    return timed.times().runs() < size_t(options.runs) || timed.times().seconds() < options.seconds;
+  };
+  ProgressBar progress("measuring", int64_t(cases.size()) * options.runs);
+  int64_t done = 0;
+  for (bool any = true; any && !interrupted();) {
+    any = false;
+    for (const auto& timed : cases) {
+      if (!is_unfinished(*timed) || interrupted()) continue;
+      any = true;
+      const size_t before = timed->times().runs();
+      timed->run_block(stretch, true);
+      done += int64_t(timed->times().runs() - before);
+      progress.advance(done, timed->name());
+    }
+  }
+  progress.finish();
+}
+
+// The results of all cases, and their circumstances.
+struct Measured {
+  const maquette::Context& context;
+  const Stretch& stretch;
+  const Cases& cases;
+  std::string bundle;
+  std::vector<std::string> left_out;
+  double create_ms = 0, other_processes_cpu_fraction = 0;
+};
+
+OrderedJson document_of(const Measured& measured, const PredictionBenchOptions& options) {
+  const std::vector<std::string> reasons = OtherProcesses::warnings(measured.other_processes_cpu_fraction);
+  OrderedJson document;
+  document["schema"] = kPredictionSchema;
+  document["machine"] = describe_machine();
+  document["build"] = describe_build(measured.context);
+  document["bundle"] = measured.bundle;
+  document["settings"] = {{"source", options.source},   {"step_s", measured.stretch.step_s},
+                          {"threads", options.threads}, {"warm_up", options.warm_up},
+                          {"runs", options.runs},       {"seconds", options.seconds}};
+  document["create_ms"] = measured.create_ms;
+  document["peak_memory_mib"] = double(peak_memory_bytes()) / kMibibytes;
+  document["other_processes_cpu_fraction"] = measured.other_processes_cpu_fraction;
+  document["valid"] = reasons.empty();
+  document["warnings"] = reasons;
+  document["left_out"] = measured.left_out;
+  document["cases"] = OrderedJson::array();
+  for (const auto& timed : measured.cases) document["cases"].push_back(json_of(*timed, measured.stretch, options));
+  const std::optional<double> four_times = four_samples_times(measured.cases);
+  if (four_times) document["four_samples_times"] = *four_times;
+  return document;
+}
+
+void print_measured(const Measured& measured, const PredictionBenchOptions& options) {
+  const maq_frame_desc desc = measured.stretch.frames.front().desc();
+  print_output("%s, %d x %d; samples at %d x %d\n", options.source.c_str(), desc.width_px, desc.height_px,
+               kNetworkSidePx, kNetworkSidePx);
+  print_cases(measured.cases);
+  const std::optional<double> four_times = four_samples_times(measured.cases);
+  if (four_times) print_output("4 samples take %.2f times as long as 1\n", *four_times);
+  print_output("create %.0f ms, peak memory %.0f MiB\n", measured.create_ms, double(peak_memory_bytes()) / kMibibytes);
+  for (const std::string& sentence : measured.left_out) print_output("%s\n", sentence.c_str());
+  for (const std::string& reason : OtherProcesses::warnings(measured.other_processes_cpu_fraction)) {
+    print_output("Warning: %s\n", reason.c_str());
+  }
+  for (const auto& timed : measured.cases) {
+    for (const std::string& reason : timed->warnings(options)) {
+      print_output("Warning: %s: %s\n", timed->name(), reason.c_str());
+    }
+  }
+}
+
 }  // namespace
 
 int run_prediction_bench(const PredictionBenchOptions& options) {
@@ -315,65 +390,18 @@ int run_prediction_bench(const PredictionBenchOptions& options) {
   std::vector<std::string> left_out;
   const auto begin = Clock::now();
   const Cases cases = make_cases(context, options, bundle, &left_out);
-  const double create_ms = ms_between(begin, Clock::now());
-
+  Measured measured{context, stretch, cases, bundle, left_out};
+  measured.create_ms = ms_between(begin, Clock::now());
   for (const auto& timed : cases) {
     for (int shown = 0; shown < options.warm_up && !interrupted(); shown += int(kMeasuredInBlock)) {
       timed->run_block(stretch, false);
     }
   }
   const OtherProcesses other_processes;
-  const auto unfinished = [&](const PredictionCase& timed) {
-    return timed.times().runs() < size_t(options.runs) || timed.times().seconds() < options.seconds;
-  };
-  ProgressBar progress("measuring", int64_t(cases.size()) * options.runs);
-  int64_t done = 0;
-  for (bool any = true; any && !interrupted();) {
-    any = false;
-    for (const auto& timed : cases) {
-      if (!unfinished(*timed) || interrupted()) continue;
-      any = true;
-      const size_t before = timed->times().runs();
-      timed->run_block(stretch, true);
-      done += int64_t(timed->times().runs() - before);
-      progress.advance(done, timed->name());
-    }
-  }
-  progress.finish();
-
-  const double others = other_processes.cpu_fraction();
-  const std::vector<std::string> reasons = OtherProcesses::warnings(others);
-  const std::optional<double> four_times = four_samples_times(cases);
-  OrderedJson document;
-  document["schema"] = kPredictionSchema;
-  document["machine"] = describe_machine();
-  document["build"] = describe_build(context);
-  document["bundle"] = bundle;
-  document["settings"] = {{"source", options.source},   {"step_s", stretch.step_s}, {"threads", options.threads},
-                          {"warm_up", options.warm_up}, {"runs", options.runs},     {"seconds", options.seconds}};
-  document["create_ms"] = create_ms;
-  document["peak_memory_mib"] = double(peak_memory_bytes()) / kMibibytes;
-  document["other_processes_cpu_fraction"] = others;
-  document["valid"] = reasons.empty();
-  document["warnings"] = reasons;
-  document["left_out"] = left_out;
-  document["cases"] = OrderedJson::array();
-  for (const auto& timed : cases) document["cases"].push_back(json_of(*timed, stretch, options));
-  if (four_times) document["four_samples_times"] = *four_times;
-
-  const maq_frame_desc desc = stretch.frames.front().desc();
-  print_output("%s, %d x %d; what is drawn at %d x %d\n", options.source.c_str(), desc.width_px, desc.height_px,
-               kNetworkSidePx, kNetworkSidePx);
-  print_cases(cases);
-  if (four_times) print_output("4 samples take %.2f times as long as 1\n", *four_times);
-  print_output("create %.0f ms, peak memory %.0f MiB\n", create_ms, double(peak_memory_bytes()) / kMibibytes);
-  for (const std::string& sentence : left_out) print_output("%s\n", sentence.c_str());
-  for (const std::string& reason : reasons) print_output("Warning: %s\n", reason.c_str());
-  for (const auto& timed : cases) {
-    for (const std::string& reason : timed->warnings(options)) {
-      print_output("Warning: %s: %s\n", timed->name(), reason.c_str());
-    }
-  }
+  measure(cases, stretch, options);
+  measured.other_processes_cpu_fraction = other_processes.cpu_fraction();
+  const OrderedJson document = document_of(measured, options);
+  print_measured(measured, options);
   if (!options.json.empty()) {
     write_json_file(options.json, document, 1);
     print_output("Written: %s\n", options.json.c_str());

@@ -1,14 +1,14 @@
-// `maquette bench --predict`: how long surprise and predicted pictures of a stream take.
+// `maquette bench --predict`: times of novelty and predicted frames.
 #pragma once
 
 #include <string>
 
 struct PredictionBenchOptions {
-  std::string source = "stub:people?count=2";  // or what parse_source_argument takes
+  std::string source = "stub:people?count=2";  // or another argument of parse_source_argument
   std::string bundle;                          // folder; "": the default one
   std::string json;                            // file; "": none
   int threads = 0;
-  int warm_up = 10, runs = 20;  // of each case, where a run is a frame or some that are drawn at once
+  int warm_up = 10, runs = 20;  // of each case; a run is a frame, or all frames of one sampling
   double seconds = 3;           // of each case, at least
 };
 

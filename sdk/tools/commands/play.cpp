@@ -145,8 +145,8 @@ void add_play_command(CLI::App& app, int* exit_code) {
       "--no-picture", [=] { options->picture = false; }, "Print only statistics; default without a terminal");
 #if MAQ_HAS_PREDICTION
   CLI::Option* conceal = command->add_flag(
-      "--conceal", options->conceal, "Bridge short gaps with predicted frames; the line below the picture says which");
-  command->add_option("--max-gap", options->max_gap_ms, "Bridge so many milliseconds at most; default: 300")
+      "--conceal", options->conceal, "Fill short gaps with predicted frames; the line below the image marks them");
+  command->add_option("--max-gap", options->max_gap_ms, "Fill gaps of at most this many milliseconds; default: 300")
       ->needs(conceal)
       ->check(CLI::Range(1, 10000));
 #endif

@@ -20,7 +20,7 @@ class PlayStatistics {
   // A frame that was just acquired.
   void add(const maq_frame_desc& desc);
 
-  // One that was predicted in place of a frame that was not there: counted apart.
+  // Counts a predicted frame, apart from captured ones.
   void add_predicted() { ++predicted_; }
   // Results of the concealer at the end: frames that came too late, and the longest wait.
   void set_concealed(uint64_t late_count, float max_wait_ms) { concealed_ = Concealed{late_count, max_wait_ms}; }

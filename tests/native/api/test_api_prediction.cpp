@@ -26,7 +26,7 @@ class ApiPrediction : public testing::Test {
   const maquette::Context context_;
 };
 
-TEST_F(ApiPrediction, AFramePredictedIsOneOfTheStreamAndSaysThatItIsMadeUp) {
+TEST_F(ApiPrediction, APredictedFrameFitsTheStreamAndIsMarked) {
   maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=30");
   maquette::Predictor predictor(context_);
   maq_frame_desc last{};
@@ -64,181 +64,158 @@ std::vector<uint8_t> bytes_of(const maquette::Frame& frame) {
   return bytes;
 }
 
-maq_predictor_config network_config(maq_network_mode mode) {
+maq_predictor_config network_config(maq_predictor_method method) {
   maq_predictor_config config;
   maquette::check(maq_predictor_config_init(&config, sizeof config));
-  config.method = MAQ_PREDICTION_NETWORK;
-  config.network_mode = mode;
-  config.bundle_path = MAQ_TEST_DATA "/tiny_transformer/bundle";
-  config.threads = 1;
+  config.method = method;
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_transformer/bundle";
+  config.model.threads = 1;
   return config;
 }
 
-TEST_F(ApiPrediction, ByNetworksItIsAnotherPictureOfTheSameTimeAndSize) {
+TEST_F(ApiPrediction, NetworksGiveAnotherImageOfTheSameTimeAndSize) {
   maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
-  maquette::Predictor automatic(context_), mended(context_, network_config(MAQ_NETWORK_AUTO)),
-      expected(context_, network_config(MAQ_NETWORK_EXPECTED)), drawn(context_, network_config(MAQ_NETWORK_DRAWN));
+  maquette::Predictor automatic(context_), refined(context_, network_config(MAQ_PREDICTOR_REFINED)),
+      sampled(context_, network_config(MAQ_PREDICTOR_SAMPLED));
   while (const auto frame = source.next()) {
-    for (maquette::Predictor* const predictor : {&automatic, &mended, &expected, &drawn}) predictor->push(*frame);
+    for (maquette::Predictor* const predictor : {&automatic, &refined, &sampled}) predictor->push(*frame);
   }
-  const maquette::Frame base = automatic.predict(0.25), by_mended = mended.predict(0.25),
-                        by_expected = expected.predict(0.25), by_drawn = drawn.predict(0.25);
-  EXPECT_NE(bytes_of(by_mended), bytes_of(by_expected));
-  for (const maquette::Frame* const frame : {&by_mended, &by_expected, &by_drawn}) {
+  const maquette::Frame base = automatic.predict(0.25), by_refined = refined.predict(0.25),
+                        by_sampled = sampled.predict(0.25);
+  EXPECT_NE(bytes_of(by_refined), bytes_of(by_sampled));
+  for (const maquette::Frame* const frame : {&by_refined, &by_sampled}) {
     EXPECT_EQ(frame->desc().width_px, 320);
     EXPECT_EQ(frame->desc().format, base.desc().format);
     EXPECT_EQ(frame->origin().horizon_ns, 250000000);
     EXPECT_NE(bytes_of(*frame), bytes_of(base));
   }
-  EXPECT_EQ(expected.stats().drawn_count, 0u);
-  EXPECT_EQ(drawn.stats().drawn_count, 3u);
-  EXPECT_GT(expected.stats().networks_ms, 0);
   EXPECT_EQ(automatic.stats().networks_ms, 0);
-  const auto expect_runs = [](const maquette::Predictor& of, maq_network_mode mode, uint32_t steps, uint32_t passes) {
+  EXPECT_GT(refined.stats().networks_ms, 0);
+  const auto expect_runs = [](const maquette::Predictor& of, maq_predictor_method method, uint32_t frames,
+                              uint32_t cells) {
     const maq_predictor_stats stats = of.stats();
-    EXPECT_EQ(stats.network_mode, mode);
-    EXPECT_EQ(stats.step_count, steps) << mode;
-    EXPECT_EQ(stats.pass_count, passes) << mode;
+    EXPECT_EQ(stats.method, method);
+    EXPECT_EQ(stats.sampled_frame_count, frames) << method;
+    EXPECT_EQ(stats.step_count, 256 * frames) << method;
+    EXPECT_EQ(stats.cell_count, cells) << method;
   };
-  expect_runs(automatic, MAQ_NETWORK_AUTO, 0, 0);
-  expect_runs(mended, MAQ_NETWORK_MENDED, 0, 1);
-  expect_runs(expected, MAQ_NETWORK_EXPECTED, 0, 1);
-  expect_runs(drawn, MAQ_NETWORK_DRAWN, 3 * 256, 0);
-  mended.predict(0);  // nothing is to be foreseen
-  expect_runs(mended, MAQ_NETWORK_AUTO, 0, 0);
-  EXPECT_EQ(drawn.stats().pushed_count, 5u);
-  drawn.reset();
-  EXPECT_THROW(drawn.predict(0.1), maquette::Error);
+  expect_runs(automatic, MAQ_PREDICTOR_AUTO, 0, 0);
+  expect_runs(refined, MAQ_PREDICTOR_REFINED, 0, 0);
+  expect_runs(sampled, MAQ_PREDICTOR_SAMPLED, 3, 256);
+  refined.predict(0);  // the newest frame itself
+  expect_runs(refined, MAQ_PREDICTOR_LAST, 0, 0);
+  EXPECT_EQ(sampled.stats().pushed_count, 5u);
+  sampled.reset();
+  EXPECT_THROW(sampled.predict(0.1), maquette::Error);
 }
 
-TEST_F(ApiPrediction, NetworksThatABundleDoesNotHaveAndDrawsOutOfRangeAreRefused) {
-  maq_predictor* made = nullptr;
+TEST_F(ApiPrediction, MissingNetworksAndSettingsOutOfRangeAreRefused) {
+  maq_predictor* created = nullptr;
   const auto refused = [&](const char* name, maq_status status, auto&& change) {
-    maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+    maq_predictor_config config = network_config(MAQ_PREDICTOR_SAMPLED);
     change(config);
-    EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), status) << name;
+    EXPECT_EQ(maq_predictor_create(context_.get(), &config, &created), status) << name;
     EXPECT_NE(text().find(name), std::string::npos) << text();
-    EXPECT_EQ(made, nullptr);
+    EXPECT_EQ(created, nullptr);
   };
-  refused("no networks", MAQ_ERROR_UNSUPPORTED,
-          [](maq_predictor_config& config) { config.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle"; });
-  refused("/nowhere", MAQ_ERROR_NOT_FOUND, [](maq_predictor_config& config) { config.bundle_path = "/nowhere"; });
+  refused("no network for sampled", MAQ_ERROR_UNSUPPORTED,
+          [](maq_predictor_config& config) { config.model.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle"; });
+  refused("no network for refined", MAQ_ERROR_UNSUPPORTED, [](maq_predictor_config& config) {
+    config.method = MAQ_PREDICTOR_REFINED;
+    config.model.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle";
+  });
+  refused("/nowhere", MAQ_ERROR_NOT_FOUND, [](maq_predictor_config& config) { config.model.bundle_path = "/nowhere"; });
   for (const float temperature : {-1.0f, std::nanf("")}) {
     refused("temperature", MAQ_ERROR_INVALID_ARGUMENT,
             [&](maq_predictor_config& config) { config.temperature = temperature; });
   }
   refused("top_k", MAQ_ERROR_INVALID_ARGUMENT, [](maq_predictor_config& config) { config.top_k = 17; });
-  refused("network_mode", MAQ_ERROR_INVALID_ARGUMENT, [](maq_predictor_config& config) {
-    const int unknown = 4;
-    std::memcpy(&config.network_mode, &unknown, sizeof unknown);
-  });
 }
 
-TEST_F(ApiPrediction, SamplesAreMarkedFramesThatDependOnNoOther) {
+TEST_F(ApiPrediction, SamplesAreMarkedAndIndependentOfTheirNumber) {
   maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
-  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+  maq_predictor_config config = network_config(MAQ_PREDICTOR_SAMPLED);
   config.temperature = 1;
   config.seed = 4;
   maquette::Predictor predictor(context_, config);
-  config.threads = 2;
+  config.model.threads = 2;
   maquette::Predictor other(context_, config);
   const auto first = source.next();
   predictor.push(*first);
   other.push(*first);
-  predictor.draw(2, 1, 0.1);
-  EXPECT_EQ(bytes_of(predictor.drawn(1, 1)), bytes_of(*first)) << "nothing is known to move";
-  EXPECT_EQ(predictor.uncertainty(1, 1), std::vector<float>(256, 0.0f));
+  predictor.sample(2, 1, 0.1);
+  EXPECT_EQ(bytes_of(predictor.acquire_sample(1, 1)), bytes_of(*first)) << "nothing is known to move";
+  EXPECT_EQ(predictor.entropy_map(1, 1), std::vector<float>(256, 0.0f));
   while (const auto frame = source.next()) {
     predictor.push(*frame);
     other.push(*frame);
   }
-  predictor.draw(3, 2, 0.1);
-  EXPECT_EQ(predictor.stats().drawn_count, 6u);
+  predictor.sample(3, 2, 0.1);
+  EXPECT_EQ(predictor.stats().sampled_frame_count, 6u);
   EXPECT_EQ(predictor.stats().step_count, 2 * 256u) << "of all samples at once";
-  EXPECT_EQ(predictor.stats().pass_count, 0u);
-  const maquette::Frame drawn = predictor.drawn(1, 2);
-  const std::vector<float> bits = predictor.uncertainty(1, 2);
-  EXPECT_EQ(drawn.desc().width_px, 320);
-  EXPECT_TRUE(drawn.is_predicted());
-  EXPECT_EQ(drawn.origin().horizon_ns, 200000000);
+  const maquette::Frame sampled = predictor.acquire_sample(1, 2);
+  const std::vector<float> bits = predictor.entropy_map(1, 2);
+  EXPECT_EQ(sampled.desc().width_px, 320);
+  EXPECT_TRUE(sampled.is_predicted());
+  EXPECT_EQ(sampled.origin().horizon_ns, 200000000);
   EXPECT_EQ(bits.size(), 256u);
   EXPECT_GT(*std::max_element(bits.begin(), bits.end()), 0.5f);
   EXPECT_LE(*std::max_element(bits.begin(), bits.end()), 4.0f) << "log2 of 16 entries";
-  EXPECT_NE(bytes_of(drawn), bytes_of(predictor.drawn(0, 2)));
-  EXPECT_NE(bytes_of(drawn), bytes_of(predictor.drawn(1, 1)));
+  EXPECT_NE(bytes_of(sampled), bytes_of(predictor.acquire_sample(0, 2)));
+  EXPECT_NE(bytes_of(sampled), bytes_of(predictor.acquire_sample(1, 1)));
   for (maquette::Predictor* const again : {&predictor, &other}) {
-    again->draw(2, 3, 0.1);  // fewer samples, more frames, other threads
-    EXPECT_EQ(bytes_of(again->drawn(1, 2)), bytes_of(drawn));
-    EXPECT_EQ(again->uncertainty(1, 2), bits);
+    again->sample(2, 3, 0.1);  // fewer samples, more frames, other threads
+    EXPECT_EQ(bytes_of(again->acquire_sample(1, 2)), bytes_of(sampled));
+    EXPECT_EQ(again->entropy_map(1, 2), bits);
   }
   config.seed = 5;
   maquette::Predictor another(context_, config);
   maquette::Source same(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
   while (const auto frame = same.next()) another.push(*frame);
-  another.draw(2, 2, 0.1);
-  EXPECT_NE(another.uncertainty(1, 2), bits);
+  another.sample(2, 2, 0.1);
+  EXPECT_NE(another.entropy_map(1, 2), bits);
 }
 
-TEST_F(ApiPrediction, PassesAreCountedUntilTheySettle) {
-  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
-  config.passes = 2;
-  config.temperature = 1;
-  maquette::Predictor two(context_, config);
-  config.passes = 16;
-  config.temperature = 0;
-  maquette::Predictor until_settled(context_, config);
-  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=4");
-  while (const auto frame = source.next()) {
-    two.push(*frame);
-    until_settled.push(*frame);
-    two.draw(1, 1, 0.1);
-    EXPECT_EQ(two.stats().pass_count == 0, two.stats().pushed_count == 1) << "then nothing is known to move";
-  }
-  two.draw(3, 2, 0.1);
-  until_settled.draw(1, 1, 0.1);
-  EXPECT_EQ(two.stats().network_mode, MAQ_NETWORK_DRAWN);
-  EXPECT_EQ(two.stats().pass_count, 3 * 2 * 2u);
-  EXPECT_EQ(two.stats().step_count, 0u);
-  EXPECT_GT(until_settled.stats().pass_count, 1u);
-  EXPECT_LE(until_settled.stats().pass_count, 16u);
-}
-
-TEST_F(ApiPrediction, PredictorsThatShareNetworksDrawAsAloneAndOutliveOneAnother) {
-  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
+TEST_F(ApiPrediction, PredictorsThatShareNetworksSampleAsAloneAndOutliveOneAnother) {
+  maq_predictor_config config = network_config(MAQ_PREDICTOR_SAMPLED);
   config.temperature = 1;
   maquette::Predictor alone(context_, config);
   auto first = std::make_unique<maquette::Predictor>(context_, config);
-  config.networks_of = first->get();
-  config.bundle_path = "/nowhere";  // not read
+  config.shared_with = first->get();
+  config.model.bundle_path = "/nowhere";  // not read
   maquette::Predictor second(context_, config);
   config.seed = 8;
   maquette::Predictor other_seed(context_, config);
   maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=4");
   while (const auto frame = source.next()) {
     for (maquette::Predictor* const each : {&alone, first.get(), &second, &other_seed}) each->push(*frame);
-    if (frame->desc().sequence == 1) first->draw(2, 1, 0.1);  // of another stream
+    if (frame->desc().sequence == 1) first->sample(2, 1, 0.1);  // of another stream
   }
-  for (maquette::Predictor* const each : {&alone, first.get(), &second, &other_seed}) each->draw(1, 2, 0.1);
-  const std::vector<float> bits = alone.uncertainty(0, 2);
-  EXPECT_EQ(second.uncertainty(0, 2), bits);
-  EXPECT_EQ(first->uncertainty(0, 2), bits);
-  EXPECT_NE(other_seed.uncertainty(0, 2), bits);
+  for (maquette::Predictor* const each : {&alone, first.get(), &second, &other_seed}) each->sample(1, 2, 0.1);
+  const std::vector<float> bits = alone.entropy_map(0, 2);
+  EXPECT_EQ(second.entropy_map(0, 2), bits);
+  EXPECT_EQ(first->entropy_map(0, 2), bits);
+  EXPECT_NE(other_seed.entropy_map(0, 2), bits);
   first.reset();
-  second.draw(1, 2, 0.1);
-  EXPECT_EQ(second.uncertainty(0, 2), bits);
+  second.sample(1, 2, 0.1);
+  EXPECT_EQ(second.entropy_map(0, 2), bits);
   const maquette::Predictor without(context_);
   maq_predictor* made = nullptr;
-  config.networks_of = without.get();
+  config.shared_with = without.get();
   EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(text().find("config.networks_of has no networks"), std::string::npos) << text();
-  config.networks_of = reinterpret_cast<const maq_predictor*>(context_.get());
+  EXPECT_NE(text().find("config.shared_with has another method"), std::string::npos) << text();
+  config.method = MAQ_PREDICTOR_AUTO;
   EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(text().find("config.networks_of is a maq_context"), std::string::npos) << text();
+  EXPECT_NE(text().find("no networks to share"), std::string::npos) << text();
+  config.method = MAQ_PREDICTOR_SAMPLED;
+  config.shared_with = reinterpret_cast<const maq_predictor*>(context_.get());
+  EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(text().find("config.shared_with is a maq_context"), std::string::npos) << text();
 }
 
-TEST_F(ApiPrediction, WhatWasNotDrawnIsToldAndForgottenWithTheFrames) {
-  maquette::Predictor predictor(context_, network_config(MAQ_NETWORK_DRAWN)), automatic(context_),
-      expected(context_, network_config(MAQ_NETWORK_EXPECTED));
+TEST_F(ApiPrediction, FramesThatWereNotSampledAreRefused) {
+  maquette::Predictor predictor(context_, network_config(MAQ_PREDICTOR_SAMPLED)), automatic(context_),
+      refined(context_, network_config(MAQ_PREDICTOR_REFINED));
   maq_frame* made = nullptr;
   std::vector<float> bits(256);
   const auto refused = [&](maq_status status, maq_status expected_status, const char* words) {
@@ -247,37 +224,47 @@ TEST_F(ApiPrediction, WhatWasNotDrawnIsToldAndForgottenWithTheFrames) {
     EXPECT_EQ(made, nullptr);
   };
   constexpr maq_status kWrong = MAQ_ERROR_INVALID_ARGUMENT;
-  refused(maq_predictor_draw(predictor.get(), 1, 1, 0.1), kWrong, "No frame was pushed");
-  for (maquette::Predictor* const each : {&predictor, &automatic, &expected}) each->push(frame(0));
-  refused(maq_predictor_draw(automatic.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "draws no samples");
-  refused(maq_predictor_draw(expected.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "draws no samples");
-  refused(maq_predictor_acquire_drawn(automatic.get(), 0, 1, &made), MAQ_ERROR_UNSUPPORTED, "draws no samples");
-  refused(maq_predictor_draw(predictor.get(), 0, 1, 0.1), kWrong, "sample_count is 0");
-  refused(maq_predictor_draw(predictor.get(), 17, 1, 0.1), kWrong, "sample_count is 17");
-  refused(maq_predictor_draw(predictor.get(), 1, 65, 0.1), kWrong, "frame_count is 65");
+  refused(maq_predictor_sample(predictor.get(), 1, 1, 0.1), kWrong, "No frame was pushed");
+  for (maquette::Predictor* const each : {&predictor, &automatic, &refined}) each->push(frame(0));
+  refused(maq_predictor_sample(automatic.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "does not sample");
+  refused(maq_predictor_sample(refined.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "does not sample");
+  refused(maq_predictor_acquire_sample(automatic.get(), 0, 1, &made), MAQ_ERROR_UNSUPPORTED, "does not sample");
+  refused(maq_predictor_sample(predictor.get(), 0, 1, 0.1), kWrong, "sample_count is 0");
+  refused(maq_predictor_sample(predictor.get(), 17, 1, 0.1), kWrong, "sample_count is 17");
+  refused(maq_predictor_sample(predictor.get(), 1, 65, 0.1), kWrong, "frame_count is 65");
   for (const double step_s : {0.0, -0.1, 0.1251, std::nan(""), double(std::numeric_limits<float>::infinity())}) {
-    refused(maq_predictor_draw(predictor.get(), 1, 1, step_s), kWrong, "step_s is");
+    refused(maq_predictor_sample(predictor.get(), 1, 1, step_s), kWrong, "step_s is");
   }
-  refused(maq_predictor_acquire_drawn(predictor.get(), 0, 1, &made), kWrong, "Frame 1 of sample 0 was asked for");
-  predictor.draw(2, 3, 0.1);
-  refused(maq_predictor_acquire_drawn(predictor.get(), 2, 1, &made), kWrong, "3 frames (from 1) of 2 samples");
-  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 0, &made), kWrong, "Frame 0");
-  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 4, &made), kWrong, "Frame 4");
-  refused(maq_predictor_acquire_drawn(predictor.get(), 1, 3, nullptr), kWrong, "frame is NULL");
-  refused(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, bits.data(), 255), kWrong, "room for 255");
-  refused(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, nullptr, 256), kWrong, "bits is NULL");
-  EXPECT_EQ(maq_predictor_copy_uncertainty(predictor.get(), 1, 3, bits.data(), 256), MAQ_OK);
+  refused(maq_predictor_acquire_sample(predictor.get(), 0, 1, &made), kWrong, "Frame 1 of sample 0 was asked for");
+  predictor.sample(2, 3, 0.1);
+  refused(maq_predictor_acquire_sample(predictor.get(), 2, 1, &made), kWrong, "3 frames (from 1) of 2 samples");
+  refused(maq_predictor_acquire_sample(predictor.get(), 1, 0, &made), kWrong, "Frame 0");
+  refused(maq_predictor_acquire_sample(predictor.get(), 1, 4, &made), kWrong, "Frame 4");
+  refused(maq_predictor_acquire_sample(predictor.get(), 1, 3, nullptr), kWrong, "frame is NULL");
+  refused(maq_predictor_copy_entropy_map(predictor.get(), 1, 3, bits.data(), 255), kWrong, "capacity is 255");
+  refused(maq_predictor_copy_entropy_map(predictor.get(), 1, 3, nullptr, 256), kWrong, "bits is NULL");
+  EXPECT_EQ(maq_predictor_copy_entropy_map(predictor.get(), 1, 3, bits.data(), 256), MAQ_OK);
   predictor.push(frame(1));
-  refused(maq_predictor_acquire_drawn(predictor.get(), 0, 1, &made), kWrong, "0 frames");
-  predictor.draw(2, 3, 0.1);
+  refused(maq_predictor_acquire_sample(predictor.get(), 0, 1, &made), kWrong, "0 frames");
+  predictor.sample(2, 3, 0.1);
   predictor.reset();
-  refused(maq_predictor_copy_uncertainty(predictor.get(), 0, 1, bits.data(), 256), kWrong, "0 frames");
-  maq_predictor_config config = network_config(MAQ_NETWORK_DRAWN);
-  config.passes = 17;
-  maq_predictor* none = nullptr;
-  EXPECT_EQ(maq_predictor_create(context_.get(), &config, &none), kWrong);
-  EXPECT_NE(text().find("config.passes is 17"), std::string::npos) << text();
-  EXPECT_EQ(maq_predictor_draw(nullptr, 1, 1, 0.1), kWrong);
+  refused(maq_predictor_copy_entropy_map(predictor.get(), 0, 1, bits.data(), 256), kWrong, "0 frames");
+  EXPECT_EQ(maq_predictor_sample(nullptr, 1, 1, 0.1), kWrong);
+}
+
+TEST_F(ApiPrediction, ACancelledSamplingReturnsItsStatusAndTheNextOneRuns) {
+  maquette::Predictor predictor(context_, network_config(MAQ_PREDICTOR_SAMPLED)), automatic(context_);
+  maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=3");
+  while (const auto frame = source.next()) {
+    predictor.push(*frame);
+    automatic.push(*frame);
+  }
+  predictor.cancel();
+  EXPECT_EQ(maq_predictor_sample(predictor.get(), 1, 1, 0.1), MAQ_CANCELLED);
+  EXPECT_EQ(maq_predictor_sample(predictor.get(), 1, 1, 0.1), MAQ_OK);
+  automatic.cancel();
+  EXPECT_NO_THROW(automatic.predict(0.1)) << "only sampling is cancelled";
+  EXPECT_EQ(maq_predictor_cancel(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiPrediction, TheAgeOfALiveFrameGrows) {
@@ -308,7 +295,7 @@ TEST_F(ApiPrediction, AFrameOfThePoolThatIsUsedAgainIsNoLongerMarked) {
   }
 }
 
-TEST_F(ApiPrediction, SavedPicturesKeepTheMark) {
+TEST_F(ApiPrediction, SavedImagesKeepTheMark) {
   const TempFolder folder;
   maquette::Predictor predictor(context_);
   predictor.push(frame(3));
@@ -390,7 +377,7 @@ TEST_F(ApiPrediction, RecordersRefusePredictedFramesUnlessTheyKeepThemMarked) {
 TEST_F(ApiPrediction, ThePoolIsBoundedAndOutlivesThePredictor) {
   maq_predictor_config config = maquette::default_predictor_config();
   config.frame_pool_size = 2;
-  config.threads = 1;
+  config.model.threads = 1;
   auto predictor = std::make_unique<maquette::Predictor>(context_, config);
   predictor->push(frame(0));
   maquette::Frame one = predictor->predict(0), other = predictor->predict(1);
@@ -430,13 +417,12 @@ TEST_F(ApiPrediction, ConfigsAndStructsOutOfRangeAreRefused) {
     EXPECT_EQ(maq_predictor_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT) << name;
     EXPECT_NE(text().find(std::string("config.") + name), std::string::npos) << text();
   };
-  refused("threads", [](maq_predictor_config& config) { config.threads = -1; });
-  refused("threads", [](maq_predictor_config& config) { config.threads = 65; });
+  refused("model.threads", [](maq_predictor_config& config) { config.model.threads = -1; });
+  refused("model.threads", [](maq_predictor_config& config) { config.model.threads = 65; });
   refused("method", [](maq_predictor_config& config) {
-    const int32_t unknown = 4;
+    const int32_t unknown = 5;
     std::memcpy(&config.method, &unknown, sizeof unknown);
   });
-  refused("frame_pool_size", [](maq_predictor_config& config) { config.frame_pool_size = 0; });
   refused("frame_pool_size", [](maq_predictor_config& config) { config.frame_pool_size = 65; });
   refused("struct_size", [](maq_predictor_config& config) { config.struct_size = 3; });
   EXPECT_EQ(maq_predictor_create(nullptr, nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);

@@ -188,12 +188,12 @@ TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
 
 TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
   const maquette::Context context;
-  for (const maq_prediction_method method : {MAQ_PREDICTION_AUTO, MAQ_PREDICTION_MOTION}) {
+  for (const maq_predictor_method method : {MAQ_PREDICTOR_AUTO, MAQ_PREDICTOR_MOTION}) {
     maq_predictor_config config = maquette::default_predictor_config();
     config.method = method;
-    config.threads = 2;
+    config.model.threads = 2;
     maquette::Predictor predictor(context, config);
-    config.threads = 1;
+    config.model.threads = 1;
     maquette::Predictor other(context, config);  // whose frames are smaller, in the same memory
     maquette::Source source(context, "stub:people?count=2&size=320x240&fps=30");
     std::vector<maquette::Frame> frames;
@@ -231,24 +231,24 @@ TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
   }
 }
 
-TEST(SteadyState, SurpriseOfAFrameTakesNothingFromTheHeap) {
+TEST(SteadyState, NoveltyOfAFrameTakesNothingFromTheHeap) {
   const maquette::Context context;
-  maq_surprise_config config = maquette::default_surprise_config();
-  config.threads = 2;
-  maquette::Surprise first(context, config);
-  config.networks_of = first.get();
-  maquette::Surprise second(context, config);
+  maq_novelty_config config = maquette::default_novelty_config();
+  config.model.threads = 2;
+  maquette::Novelty first(context, config);
+  config.shared_with = first.get();
+  maquette::Novelty second(context, config);
   maquette::Source source(context, "stub:people?count=2&size=320x240&fps=30");
   std::vector<maquette::Frame> frames;
   for (int i = 0; i < 3; ++i) frames.push_back(std::move(*source.next()));
   std::vector<float> map(256);
   const auto run = [&](int count) {
     for (int i = 0; i < count; ++i) {
-      for (const maquette::Surprise* surprise : {&first, &second}) {
-        maq_surprise_score score{};
+      for (const maquette::Novelty* novelty : {&first, &second}) {
+        maq_novelty_score score{};
         score.struct_size = sizeof score;
-        ASSERT_EQ(maq_surprise_push(surprise->get(), frames[size_t(i) % 3].get(), &score), MAQ_OK);
-        ASSERT_EQ(maq_surprise_copy_map(surprise->get(), map.data(), map.size()), MAQ_OK);
+        ASSERT_EQ(maq_novelty_push(novelty->get(), frames[size_t(i) % 3].get(), &score), MAQ_OK);
+        ASSERT_EQ(maq_novelty_copy_map(novelty->get(), map.data(), map.size()), MAQ_OK);
       }
     }
   };

@@ -11,7 +11,7 @@
 
 namespace {
 
-// What came from the thread.
+// The frames from the thread.
 class PredictionRun {
  public:
   explicit PredictionRun(const maquette::PredictionChoice& choice = {}, bool real_time = false)
@@ -61,7 +61,7 @@ double difference(const maquette::RgbaImage& one, const maquette::RgbaImage& oth
 
 TEST(LivePrediction, ShowsWhatComesBesideWhatIs) {
   maquette::PredictionChoice choice;
-  choice.method = MAQ_PREDICTION_MOTION;
+  choice.method = MAQ_PREDICTOR_MOTION;
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=6");
   ASSERT_TRUE(run.until_ended());
@@ -70,36 +70,36 @@ TEST(LivePrediction, ShowsWhatComesBesideWhatIs) {
   ASSERT_EQ(seen.size(), 6u);
   EXPECT_EQ(difference(seen[0].now, seen[0].next), 0) << "of one frame, no motion is known";
   EXPECT_GT(difference(seen[5].now, seen[5].next), 0.1);
-  EXPECT_EQ(seen[5].stats.method, MAQ_PREDICTION_MOTION);
+  EXPECT_EQ(seen[5].stats.method, MAQ_PREDICTOR_MOTION);
   EXPECT_EQ(seen[5].number, 6u);
 }
 
-TEST(LivePrediction, SurpriseIsFoundOfEachFrameWhileItIsWanted) {
+TEST(LivePrediction, NoveltyIsScoredForEachFrameWhileItIsWanted) {
   maquette::PredictionChoice choice;
-  choice.finds_surprise = true;
+  choice.scores_novelty = true;
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=12");
   ASSERT_TRUE(run.until_ended());
   EXPECT_EQ(run.live.status().problem, "");
   const maquette::PredictionFrame last = run.seen().back();
-  ASSERT_EQ(last.surprise.size(), 12u);
-  EXPECT_EQ(last.surprise[0].score.is_start, 1);
-  EXPECT_EQ(last.surprise[11].score.is_start, 0);
-  EXPECT_GT(last.surprise[11].time_s, last.surprise[10].time_s);
-  const maq_surprise_score& score = last.surprise[11].score;
-  EXPECT_EQ(last.surprise_bits.size(), size_t(score.rows) * size_t(score.columns));
-  EXPECT_GT(last.surprise_ms, 0);
-  choice.finds_surprise = false;
+  ASSERT_EQ(last.novelty.size(), 12u);
+  EXPECT_EQ(last.novelty[0].score.is_stream_start, 1);
+  EXPECT_EQ(last.novelty[11].score.is_stream_start, 0);
+  EXPECT_GT(last.novelty[11].time_s, last.novelty[10].time_s);
+  const maq_novelty_score& score = last.novelty[11].score;
+  EXPECT_EQ(last.novelty_bits.size(), size_t(score.rows) * size_t(score.columns));
+  EXPECT_GT(last.novelty_ms, 0);
+  choice.scores_novelty = false;
   run.live.set_choice(choice);
   run.live.open("stub:people?size=160x120&frames=3");
   ASSERT_TRUE(wait_until([&] { return run.seen().size() == 15; }));
-  EXPECT_TRUE(run.seen().back().surprise.empty());
-  EXPECT_TRUE(run.seen().back().surprise_bits.empty());
+  EXPECT_TRUE(run.seen().back().novelty.empty());
+  EXPECT_TRUE(run.seen().back().novelty_bits.empty());
 }
 
-TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
+TEST(LivePrediction, WithoutTheNetworkOfNoveltyTheImageGoesOn) {
   maquette::PredictionChoice choice;
-  choice.finds_surprise = true;
+  choice.scores_novelty = true;
   choice.bundle = "/nowhere";
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=3");
@@ -107,12 +107,12 @@ TEST(LivePrediction, WithoutTheNetworkOfSurpriseThePictureGoesOn) {
   EXPECT_FALSE(run.live.status().has_failed);
   EXPECT_NE(run.live.status().problem.find("/nowhere"), std::string::npos) << run.live.status().problem;
   EXPECT_EQ(run.seen().size(), 3u);
-  EXPECT_TRUE(run.seen().back().surprise.empty());
+  EXPECT_TRUE(run.seen().back().novelty.empty());
 }
 
 TEST(LivePrediction, ANetworkMendsWhatComesWhereThereIsOne) {
   maquette::PredictionChoice choice;
-  choice.method = MAQ_PREDICTION_NETWORK;
+  choice.method = MAQ_PREDICTOR_REFINED;
   for (const char* const bundle : {MAQ_TEST_DATA "/tiny_transformer/bundle", "/nowhere"}) {
     choice.bundle = bundle;
     PredictionRun run(choice);
@@ -124,69 +124,69 @@ TEST(LivePrediction, ANetworkMendsWhatComesWhereThereIsOne) {
     const maquette::PredictionFrame last = run.last();
     EXPECT_EQ(last.number, 12u);
     EXPECT_EQ(last.stats.networks_ms > 0, is_there);
-    EXPECT_EQ(maquette::text_of_method(last.stats).find(", mended") != std::string::npos, is_there);
+    EXPECT_EQ(maquette::text_of_method(last.stats).find(", refined") != std::string::npos, is_there);
   }
 }
 
-maquette::PredictionChoice drawing_choice() {
+maquette::PredictionChoice sampling_choice() {
   maquette::PredictionChoice choice;
-  choice.finds_uncertainty = choice.draws_sample = true;
+  choice.shows_entropy = choice.shows_sample = true;
   choice.bundle = MAQ_TEST_DATA "/tiny_transformer/bundle";
   return choice;
 }
 
-TEST(LivePrediction, UncertaintyAndASampleAreThoseOfEachFrameWhereFramesWait) {
-  PredictionRun run(drawing_choice());
+TEST(LivePrediction, EachFrameHasEntropyAndASampleWhereFramesWait) {
+  PredictionRun run(sampling_choice());
   run.live.open("stub:people?size=320x240&frames=6");
   ASSERT_TRUE(run.until_ended());
   EXPECT_EQ(run.live.status().problem, "");
   const auto seen = run.seen();
   ASSERT_EQ(seen.size(), 6u);
   for (const auto& frame : seen) {
-    EXPECT_EQ(frame.drawn.number, frame.number);
-    EXPECT_EQ(frame.drawn_age_ms, 0);
-    EXPECT_EQ(frame.drawn.ahead_s, 0.2);
-    EXPECT_EQ(frame.drawn.bits.size(), 256u);
-    EXPECT_EQ(frame.drawn.picture.width_px, 256);
-    EXPECT_EQ(frame.drawn.picture.height_px, 192);
+    EXPECT_EQ(frame.sampled.number, frame.number);
+    EXPECT_EQ(frame.sample_age_ms, 0);
+    EXPECT_EQ(frame.sampled.ahead_s, 0.2);
+    EXPECT_EQ(frame.sampled.bits.size(), 256u);
+    EXPECT_EQ(frame.sampled.picture.width_px, 256);
+    EXPECT_EQ(frame.sampled.picture.height_px, 192);
   }
   const auto most = [](const std::vector<float>& bits) { return *std::max_element(bits.begin(), bits.end()); };
-  EXPECT_EQ(most(seen[0].drawn.bits), 0) << "of one frame, no motion is known";
-  EXPECT_GT(most(seen[5].drawn.bits), 0.1f);
-  EXPECT_GT(difference(seen[4].drawn.picture, seen[5].drawn.picture), 0);
+  EXPECT_EQ(most(seen[0].sampled.bits), 0) << "of one frame, no motion is known";
+  EXPECT_GT(most(seen[5].sampled.bits), 0.1f);
+  EXPECT_GT(difference(seen[4].sampled.image, seen[5].sampled.image), 0);
 
-  maquette::PredictionChoice choice = drawing_choice();
-  choice.draws_sample = false;
+  maquette::PredictionChoice choice = sampling_choice();
+  choice.shows_sample = false;
   run.live.set_choice(choice);
-  ASSERT_TRUE(wait_until([&] { return run.seen().back().drawn.picture.empty(); }));
-  EXPECT_EQ(run.seen().back().drawn.bits, seen[5].drawn.bits);
+  ASSERT_TRUE(wait_until([&] { return run.seen().back().sampled.image.empty(); }));
+  EXPECT_EQ(run.seen().back().sampled.bits, seen[5].sampled.bits);
   EXPECT_EQ(run.seen().back().number, 6u) << "the same frame";
 }
 
-TEST(LivePrediction, WhatIsDrawnBesideALiveStreamSaysHowOldItIs) {
-  maquette::PredictionChoice choice = drawing_choice();
+TEST(LivePrediction, ASampleBesideALiveStreamHasItsAge) {
+  maquette::PredictionChoice choice = sampling_choice();
   choice.ahead_s = 0.1;
   PredictionRun run(choice, true);
   run.live.open("stub:people?size=64x48&fps=30");
   // No frame waits for it.
   ASSERT_TRUE(wait_until([&] {
     const maquette::PredictionFrame frame = run.last();
-    return frame.drawn.number > 0 && frame.drawn_age_ms > 30;
+    return frame.sampled.number > 0 && frame.sample_age_ms > 30;
   }));
-  for (const auto& frame : run.seen()) EXPECT_GE(frame.drawn_age_ms, 0);
+  for (const auto& frame : run.seen()) EXPECT_GE(frame.sample_age_ms, 0);
   run.live.set_paused(true);
   choice.ahead_s = 0.05;
   run.live.set_choice(choice);
-  ASSERT_TRUE(wait_until([&] { return run.last().drawn.ahead_s == 0.05; })) << "also while it is paused";
-  EXPECT_LT(run.last().drawn_age_ms, 70) << "of the latest frame, or one of those left out after it";
-  choice.finds_uncertainty = choice.draws_sample = false;
+  ASSERT_TRUE(wait_until([&] { return run.last().sampled.ahead_s == 0.05; })) << "also while it is paused";
+  EXPECT_LT(run.last().sample_age_ms, 70) << "of the latest frame, or one of those left out after it";
+  choice.shows_entropy = choice.shows_sample = false;
   run.live.set_choice(choice);
   run.live.set_paused(false);
-  ASSERT_TRUE(wait_until([&] { return run.last().drawn.number == 0; }));
+  ASSERT_TRUE(wait_until([&] { return run.last().sampled.number == 0; }));
 }
 
-TEST(LivePrediction, WithoutNetworksThatDrawThePictureGoesOn) {
-  maquette::PredictionChoice choice = drawing_choice();
+TEST(LivePrediction, WithoutSamplingNetworksTheImageGoesOn) {
+  maquette::PredictionChoice choice = sampling_choice();
   choice.bundle = MAQ_TEST_DATA "/tiny_prediction/bundle";
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=3");
@@ -195,12 +195,12 @@ TEST(LivePrediction, WithoutNetworksThatDrawThePictureGoesOn) {
   EXPECT_NE(run.live.status().problem.find("tiny-prediction has no networks"), std::string::npos)
       << run.live.status().problem;
   EXPECT_EQ(run.seen().size(), 3u);
-  EXPECT_EQ(run.seen().back().drawn.number, 0u);
+  EXPECT_EQ(run.seen().back().sampled.number, 0u);
 }
 
 TEST(LivePrediction, AnotherTimeAheadIsSeenAfterTheEndToo) {
   maquette::PredictionChoice choice;
-  choice.method = MAQ_PREDICTION_MOTION;
+  choice.method = MAQ_PREDICTOR_MOTION;
   choice.ahead_s = 0;
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=4");
@@ -214,9 +214,9 @@ TEST(LivePrediction, AnotherTimeAheadIsSeenAfterTheEndToo) {
   EXPECT_EQ(run.seen()[4].ahead_s, 0.3);
 }
 
-TEST(LivePrediction, GapsAreBridgedAndMarkedAndPredictionGoesOnFromTheCapturedFrame) {
+TEST(LivePrediction, GapsAreFilledAndMarkedAndPredictionContinuesFromTheCapturedFrame) {
   maquette::PredictionChoice choice;
-  choice.bridges_gaps = true;
+  choice.conceals_gaps = true;
   PredictionRun run(choice, true);
   // Frames are lost for as long as it takes: under a sanitizer this thread may be too slow for the first gaps.
   run.live.open("stub:people?size=160x120&fps=5&drop=0.3");
@@ -227,9 +227,9 @@ TEST(LivePrediction, GapsAreBridgedAndMarkedAndPredictionGoesOnFromTheCapturedFr
     return std::optional<maquette::PredictionFrame>();
   };
   ASSERT_TRUE(wait_until([&] { return made_up().has_value(); }));
-  EXPECT_TRUE(made_up()->bridges_gaps);
+  EXPECT_TRUE(made_up()->conceals_gaps);
   EXPECT_GT(made_up()->gaps.predicted_count, 0u);
-  EXPECT_GT(made_up()->made_ahead_s, made_up()->ahead_s + 0.05);
+  EXPECT_GT(made_up()->predicted_ahead_s, made_up()->ahead_s + 0.05);
 }
 
 TEST(LivePrediction, WithoutTheSwitchNothingIsMadeUp) {
@@ -263,7 +263,7 @@ TEST(LivePrediction, CloseLetsTheSourceGoAndRecordingsHaveCapturedFrames) {
   const std::string path = testing::TempDir() + "/live_prediction.maqrec";
   std::filesystem::remove(path);
   maquette::PredictionChoice choice;
-  choice.bridges_gaps = true;
+  choice.conceals_gaps = true;
   PredictionRun run(choice, true);
   run.live.open("stub:people?size=160x120&fps=10&drop=0.2");
   run.live.set_recording(path);

@@ -1,37 +1,20 @@
-// `maquette predict` as a person meets it: figures, clips, marked pictures, sentences.
+// `maquette predict` for its user: errors, clips, marked images, sentences.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
-#include <sstream>
 #include <string>
 
 #include "support/program_run.h"
+#include "support/samples/square_clip.h"
 
 namespace {
 
 class PredictCommandLine : public ::testing::Test {
  protected:
-  // A textured square that moves by 4 pixels a frame over a texture that stands still.
-  PredictCommandLine() {
-    cv::VideoWriter clip(folder_.file("square.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {160, 120});
-    for (int i = 0; i < 20; ++i) {
-      cv::Mat picture(120, 160, CV_8UC3);
-      for (int y = 0; y < picture.rows; ++y) {
-        for (int x = 0; x < picture.cols; ++x) {
-          const double u = x - 10 - 4 * i, v = y - 30;
-          const bool is_thing = u >= 0 && u < 48 && v >= 0 && v < 48;
-          const double value = is_thing ? 170 + 60 * std::sin(0.5 * u) * std::sin(0.4 * v)
-                                        : 90 + 40 * std::sin(0.3 * x) * std::sin(0.2 * y);
-          picture.at<cv::Vec3b>(y, x) = cv::Vec3b::all(uint8_t(value));
-        }
-      }
-      clip.write(picture);
-    }
-  }
+  PredictCommandLine() { write_square_clip(folder_.file("square.avi")); }
 
   Outcome run(const std::string& arguments) const {
     return run_program(folder_, "MAQ_BUNDLE=", "predict " + arguments);
@@ -72,19 +55,20 @@ TEST_F(PredictCommandLine, MotionIsNearerToTheTruthThanTheLastFrame) {
   EXPECT_NEAR(document["frames"][4]["ahead_s"].get<double>(), 0.25, 1e-6);
 }
 
-TEST_F(PredictCommandLine, ANetworkChangesWhatAutoHas) {
+TEST_F(PredictCommandLine, ANetworkRefinesAuto) {
   const auto figures = [&](const std::string& arguments) {
     const Outcome result = run("square.avi --from 12 --frames 2 --compare --json " + arguments);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return nlohmann::json::parse(result.out);
   };
-  const auto mended = figures("--method network --out row.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
-  EXPECT_EQ(mended["method"], "network");
-  EXPECT_NE(mended["frames"][0]["psnr_db"]["chosen"], figures("")["frames"][0]["psnr_db"]["chosen"]);
+  const auto refined = figures("--method refined --out row.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
+  EXPECT_EQ(refined["method"], "refined");
+  EXPECT_EQ(refined["frames"][0]["method"], "refined");
+  EXPECT_NE(refined["frames"][0]["psnr_db"]["chosen"], figures("")["frames"][0]["psnr_db"]["chosen"]);
   cv::VideoCapture clip(folder_.file("row.avi"));
   EXPECT_EQ(clip.get(cv::CAP_PROP_FRAME_WIDTH), 4 * 160) << "truth, last, motion and that";
-  expect_failure("square.avi --compare --method network --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'",
-                 "no networks that foresee pictures");
+  expect_failure("square.avi --compare --method refined --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'",
+                 "no network for refined prediction");
 }
 
 TEST_F(PredictCommandLine, PicturesInAFolderAreMarkedInside) {
@@ -123,12 +107,12 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
   for (const auto& frame : first) {
     ASSERT_EQ(frame["psnr_db"]["samples"].size(), 2u);
     EXPECT_NE(frame["psnr_db"]["samples"][0], frame["psnr_db"]["samples"][1]);
-    EXPECT_GT(frame["uncertainty_bits"].get<double>(), 0.1);
+    EXPECT_GT(frame["entropy_bits"].get<double>(), 0.1);
   }
   cv::VideoCapture clip(folder_.file("row.avi"));
   cv::Mat picture;
   ASSERT_TRUE(clip.read(picture));
-  EXPECT_EQ(picture.cols, 7 * 160) << "truth, last, motion, auto, two samples, uncertainty";
+  EXPECT_EQ(picture.cols, 7 * 160) << "truth, last, motion, auto, two samples, entropy";
   const auto samples_of = [](const nlohmann::json& frames) {
     std::vector<nlohmann::json> found;
     for (const auto& frame : frames) found.push_back(frame["psnr_db"]["samples"]);
@@ -140,8 +124,7 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
   for (const char* name : {"square_ahead_001_sample_01.png", "square_ahead_002_sample_02.png"}) {
     EXPECT_NE(read_text(folder_.file(std::string("pictures/") + name)).find("maquette horizon_ns="), std::string::npos);
   }
-  for (const char* wrong : {"--samples 17", "--samples 2 --temperature -1", "--samples 2 --passes 17", "--seed 3",
-                            "--samples 2 --surprise"}) {
+  for (const char* wrong : {"--samples 17", "--samples 2 --temperature -1", "--seed 3", "--method refined --top-k 3"}) {
     EXPECT_EQ(run(std::string("square.avi --compare ") + wrong).exit_code, 2) << wrong;
   }
   expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");
@@ -181,7 +164,7 @@ TEST_F(PredictCommandLine, PlayConcealsAStallAndCountsWhatItMadeUp) {
   EXPECT_FALSE(nlohmann::json::parse(read_text(folder_.file("b.json"))).contains("concealed"));
 }
 
-TEST_F(PredictCommandLine, BenchMeasuresEachStageOfWhatIsPredicted) {
+TEST_F(PredictCommandLine, BenchMeasuresEachStageOfPrediction) {
   const std::string bundle = " --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle' --runs 2 --seconds 0 --warm-up 0 ";
   const Outcome result = run_program(folder_, "MAQ_BUNDLE=", "bench --predict square.avi --json b.json" + bundle);
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -195,8 +178,8 @@ TEST_F(PredictCommandLine, BenchMeasuresEachStageOfWhatIsPredicted) {
   std::vector<std::string> names;
   for (const auto& timed : document["cases"]) {
     names.push_back(timed["name"]);
-    const bool is_drawn = timed.contains("samples");
-    EXPECT_EQ(timed["size_px"], is_drawn ? nlohmann::json({64, 64}) : nlohmann::json({160, 120})) << timed["name"];
+    const bool is_sampled = timed.contains("samples");
+    EXPECT_EQ(timed["size_px"], is_sampled ? nlohmann::json({64, 64}) : nlohmann::json({160, 120})) << timed["name"];
     EXPECT_GE(timed["runs"], 2);
     double stages = 0;
     for (const auto& [name, ms] : timed["ms"].items()) {
@@ -209,18 +192,18 @@ TEST_F(PredictCommandLine, BenchMeasuresEachStageOfWhatIsPredicted) {
       EXPECT_EQ(warning.get<std::string>().find("nothing moved"), std::string::npos) << "the square does";
     }
   }
-  EXPECT_EQ(names.size(), 10u);
-  EXPECT_EQ(names.front(), "surprise");
+  EXPECT_EQ(names.size(), 8u);
+  EXPECT_EQ(names.front(), "novelty");
 }
 
 TEST_F(PredictCommandLine, BenchSaysWhatItCannotMeasure) {
   const auto bench = [&](const std::string& arguments) {
     return run_program(folder_, "MAQ_BUNDLE=", "bench --predict --runs 1 --seconds 0 --warm-up 0 " + arguments);
   };
-  const Outcome table_alone = bench("square.avi --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'");
-  EXPECT_EQ(table_alone.exit_code, 0) << table_alone.err;
-  EXPECT_NE(table_alone.out.find("Frames are not drawn: "), std::string::npos) << table_alone.out;
-  EXPECT_EQ(table_alone.out.find("next drawn"), std::string::npos) << table_alone.out;
+  const Outcome bigrams_alone = bench("square.avi --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'");
+  EXPECT_EQ(bigrams_alone.exit_code, 0) << bigrams_alone.err;
+  EXPECT_NE(bigrams_alone.out.find("No frame is sampled: "), std::string::npos) << bigrams_alone.out;
+  EXPECT_EQ(bigrams_alone.out.find("next, sampled"), std::string::npos) << bigrams_alone.out;
   const cv::Mat grey(48, 64, CV_8UC3, cv::Scalar::all(90));
   cv::VideoWriter clip(folder_.file("still.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, grey.size());
   for (int i = 0; i < 16; ++i) clip.write(grey);
@@ -248,84 +231,6 @@ TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {
   expect_failure("square.avi --compare --out next.gif", "ends in .gif");
   EXPECT_NE(run("square.avi --compare --method latent").exit_code, 0);
   EXPECT_NE(run("--help").out.find("maquette predict clip.mp4 --from 40"), std::string::npos);
-}
-
-TEST_F(PredictCommandLine, SaysHowSurprisingFramesAre) {
-  const Outcome lines = run("square.avi --surprise --json");
-  ASSERT_EQ(lines.exit_code, 0) << lines.err;
-  std::istringstream text(lines.out);
-  int frames = 0;
-  for (std::string line; std::getline(text, line); ++frames) {
-    const auto frame = nlohmann::json::parse(line);
-    EXPECT_EQ(frame["source"], "square");
-    EXPECT_EQ(frame["frame"], frames);
-    EXPECT_EQ(frame["start"], frames == 0);
-    EXPECT_GE(frame["bits"].get<double>(), 0);
-    EXPECT_TRUE(frame["peak"]["x_px"].get<double>() > 0 && frame["peak"]["x_px"].get<double>() < 160);
-  }
-  EXPECT_EQ(frames, 20);
-  const Outcome summary = run("square.avi --surprise --max-frames 12");
-  ASSERT_EQ(summary.exit_code, 0) << summary.err;
-  EXPECT_NE(summary.out.find("12 frames"), std::string::npos) << summary.out;
-}
-
-TEST_F(PredictCommandLine, SaysHowSurprisingACameraIsAlsoWhenItWasAway) {
-  const Outcome lines =
-      run("'stub:people?size=64x48&fps=50&live=1&unplug=200ms@10' --surprise --json --max-frames 20 --bundle "
-          "'" MAQ_TEST_DATA "/tiny_prediction/bundle'");
-  ASSERT_EQ(lines.exit_code, 0) << lines.err;
-  EXPECT_NE(lines.err.find("unplugged"), std::string::npos) << lines.err;
-  std::istringstream text(lines.out);
-  int64_t before_ns = 0, longest_ns = 0;
-  int frames = 0;
-  for (std::string line; std::getline(text, line); ++frames) {
-    const auto frame = nlohmann::json::parse(line);
-    const int64_t time_ns = frame["timestamp_ns"];
-    EXPECT_GT(time_ns, before_ns);
-    if (frames > 0) longest_ns = std::max(longest_ns, time_ns - before_ns);
-    EXPECT_TRUE(frames > 0 || frame["start"]);
-    before_ns = time_ns;
-  }
-  EXPECT_EQ(frames, 20);
-  EXPECT_GT(longest_ns, 150000000) << "no line for frames that did not come";
-}
-
-TEST_F(PredictCommandLine, NamesTheEventsOfAClip) {
-  cv::VideoWriter clip(folder_.file("cut.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, {160, 120});
-  cv::VideoCapture square(folder_.file("square.avi"));
-  cv::Mat picture;
-  for (int i = 0; i < 30; ++i) {
-    if (i < 20) square.read(picture);
-    if (i >= 20) picture = cv::Mat(120, 160, CV_8UC3, cv::Scalar(20, 20, 200));
-    clip.write(picture);
-  }
-  clip.release();
-  const Outcome result = run("cut.avi --surprise --events 6");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("1.00 s  frame 20"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("  cut\n"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("1 events"), std::string::npos) << result.out;
-}
-
-TEST_F(PredictCommandLine, DrawsSurpriseAsAClip) {
-  const Outcome result = run("square.avi --surprise --max-frames 8 --out o/surprise.avi");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find(" -> o/surprise.avi"), std::string::npos) << result.out;
-  cv::VideoCapture clip(folder_.file("o/surprise.avi"));
-  int frames = 0;
-  for (cv::Mat picture; clip.read(picture); ++frames) EXPECT_EQ(picture.size(), cv::Size(320, 120 + 64));
-  EXPECT_EQ(frames, 8);
-}
-
-TEST_F(PredictCommandLine, SurpriseAndPicturesDoNotMix) {
-  for (const char* wrong :
-       {"square.avi --surprise --compare", "square.avi --events 6", "square.avi --surprise --events 1",
-        "square.avi --surprise --max-frames 0", "square.avi --surprise --from 3"}) {
-    EXPECT_EQ(run(wrong).exit_code, 2) << wrong;
-  }
-  expect_failure("square.avi --surprise --out pictures", "ends in .mp4 or .avi");
-  expect_failure("missing.avi --surprise", "missing.avi");
-  expect_failure("square.avi --surprise --bundle nowhere", "nowhere");
 }
 
 }  // namespace

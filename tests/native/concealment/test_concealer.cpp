@@ -32,7 +32,7 @@ class Concealer : public testing::Test {
     maq_concealer_config config = maquette::default_concealer_config();
     config.threads = 1;
     config.max_gap_ms = max_gap_ms;
-    config.method = MAQ_PREDICTION_LAST;  // fast enough for the rates here with sanitizers, too
+    config.method = MAQ_PREDICTOR_LAST;  // fast enough for the rates here with sanitizers, too
     return config;
   }
   // Until `count` captured frames have come.
@@ -69,7 +69,7 @@ class Concealer : public testing::Test {
 TEST_F(Concealer, AStallOf200MsIsBridgedAtTheSourcesRate) {
   maquette::Source source = open("stub:people?fps=30&size=64x48&stall=200ms@30");
   maq_concealer_config by_motion = config();
-  by_motion.method = MAQ_PREDICTION_AUTO;
+  by_motion.method = MAQ_PREDICTOR_AUTO;
   maquette::Concealer concealer(context_, source, by_motion);
   const std::vector<Seen> all = take(concealer, 40);
   const int predicted = check(all, 300);
@@ -247,10 +247,8 @@ TEST_F(Concealer, WhatIsWrongIsTold) {
     EXPECT_EQ(maq_concealer_create(context_.get(), source.get(), &wrong, &made), MAQ_ERROR_INVALID_ARGUMENT) << name;
     EXPECT_NE(latest_text().find(std::string("config.") + name), std::string::npos) << latest_text();
   };
-  refused("max_gap_ms", [](maq_concealer_config& wrong) { wrong.max_gap_ms = 0; });
   refused("max_gap_ms", [](maq_concealer_config& wrong) { wrong.max_gap_ms = 10001; });
   refused("threads", [](maq_concealer_config& wrong) { wrong.threads = 65; });
-  refused("frame_pool_size", [](maq_concealer_config& wrong) { wrong.frame_pool_size = 0; });
   refused("struct_size", [](maq_concealer_config& wrong) { wrong.struct_size = 1; });
   EXPECT_EQ(maq_concealer_create(nullptr, source.get(), nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_concealer_create(context_.get(), nullptr, nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);

@@ -1,4 +1,4 @@
-// What comes next, and surprise, on the pipeline's thread.
+// Prediction and novelty on the pipeline's thread.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -49,35 +49,34 @@ class PredictionPipeline : public testing::Test {
     maquette::Pipeline pipeline;  // last: its thread uses the others
   };
 
-  maquette::Predictor predictor(maq_prediction_method method) const {
+  maquette::Predictor predictor(maq_predictor_method method) const {
     maq_predictor_config config = maquette::default_predictor_config();
     config.method = method;
-    config.network_mode = MAQ_NETWORK_DRAWN;
-    config.bundle_path = kTinyNetworks;
+    config.model.bundle_path = kTinyNetworks;
     config.temperature = 1;
-    config.threads = 1;
+    config.model.threads = 1;
     return maquette::Predictor(context, config);
   }
-  maquette::Surprise surprise() const {
-    maq_surprise_config config = maquette::default_surprise_config();
-    config.bundle_path = kTinyNetworks;
-    config.threads = 1;
+  maquette::Novelty novelty() const {
+    maq_novelty_config config = maquette::default_novelty_config();
+    config.model.bundle_path = kTinyNetworks;
+    config.model.threads = 1;
     config.event_ratio = 1.1f;
-    return maquette::Surprise(context, config);
+    return maquette::Novelty(context, config);
   }
-  // Frames are as a predictor and a surprise of the app's own make them.
-  void expect_as_alone(maq_prediction_method method) const {
+  // Results equal a predictor and a novelty stream of the app.
+  void expect_as_alone(maq_predictor_method method) const {
     Kept kept(context);
     {
       const maquette::Predictor lent = predictor(method);
-      const maquette::Surprise bits = surprise();
+      const maquette::Novelty bits = novelty();
       kept.pipeline.set_model(maquette::PredictionModel(context, lent, 0.15, &bits));
     }
     kept.pipeline.set_source(kWalkers);
     ASSERT_TRUE(kept.until_ended());
     ASSERT_EQ(kept.results.size(), 10u);
     maquette::Predictor own = predictor(method);
-    maquette::Surprise own_surprise = surprise();
+    maquette::Novelty own_novelty = novelty();
     for (const maquette::PipelineResult& result : kept.results) {
       own.push(result.frame);
       const auto predicted = maquette::predicted_frame_of(result);
@@ -86,14 +85,14 @@ class PredictionPipeline : public testing::Test {
       EXPECT_TRUE(predicted->is_predicted());
       EXPECT_EQ(predicted->origin().horizon_ns, 150000000);
       EXPECT_FALSE(result.frame.is_predicted());
-      const maq_surprise_score score = own_surprise.push(result.frame);
+      const maq_novelty_score score = own_novelty.push(result.frame);
       const auto novelty = maquette::novelty_of(result);
       ASSERT_TRUE(novelty);
       EXPECT_EQ(novelty->bits, score.bits);
       EXPECT_EQ(novelty->ratio, score.ratio);
       EXPECT_EQ(novelty->is_event, score.is_event);
       EXPECT_EQ(novelty->is_cut, score.is_cut);
-      EXPECT_EQ(novelty->is_start, score.is_start);
+      EXPECT_EQ(novelty->is_stream_start, score.is_stream_start);
       EXPECT_GT(result.run_ms, 0);
     }
     EXPECT_NE(pixels_of(*maquette::predicted_frame_of(kept.results.back())), pixels_of(kept.results.back().frame))
@@ -103,13 +102,13 @@ class PredictionPipeline : public testing::Test {
   const maquette::Context context;
 };
 
-TEST_F(PredictionPipeline, GivesWhatAPredictorAndASurpriseOfTheirOwnGive) { expect_as_alone(MAQ_PREDICTION_MOTION); }
+TEST_F(PredictionPipeline, ResultsEqualAPredictorAndANoveltyStreamOfTheApp) { expect_as_alone(MAQ_PREDICTOR_MOTION); }
 
-TEST_F(PredictionPipeline, NetworksAreThoseOfThePredictorWhichIsGone) { expect_as_alone(MAQ_PREDICTION_NETWORK); }
+TEST_F(PredictionPipeline, NetworksAreSharedWithAPredictorThatIsGone) { expect_as_alone(MAQ_PREDICTOR_SAMPLED); }
 
-TEST_F(PredictionPipeline, WithoutSurpriseThereIsNoneAndAnotherSourceBeginsAnew) {
+TEST_F(PredictionPipeline, WithoutNoveltyThereIsNoScoreAndAnotherSourceBeginsAnew) {
   Kept kept(context);
-  kept.pipeline.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_MOTION), 0.1));
+  kept.pipeline.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_MOTION), 0.1));
   for (size_t count : {10u, 20u}) {
     kept.pipeline.set_source(kWalkers);
     ASSERT_TRUE(wait_until([&] {
@@ -128,7 +127,7 @@ TEST_F(PredictionPipeline, WithoutSurpriseThereIsNoneAndAnotherSourceBeginsAnew)
 #if MAQ_HAS_DENSEPOSE
 TEST_F(PredictionPipeline, ModelsTakeTurns) {
   maquette::Pipeline live(context);
-  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_AUTO), 0.1));
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_AUTO), 0.1));
   live.set_source("stub:people?size=96x72&live=1&fps=200");
   EXPECT_TRUE(maquette::predicted_frame_of(*live.next(kPatienceNs)));
   maq_densepose_config people = maquette::default_densepose_config();
@@ -141,9 +140,9 @@ TEST_F(PredictionPipeline, ModelsTakeTurns) {
   EXPECT_NE(maquette::densepose_of(*of_people).get(), nullptr);
   EXPECT_FALSE(maquette::predicted_frame_of(*of_people));
   EXPECT_FALSE(maquette::novelty_of(*of_people));
-  const maquette::Surprise bits = surprise();
+  const maquette::Novelty bits = novelty();
   live.stop();
-  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_LAST), 0, &bits));
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_LAST), 0, &bits));
   live.set_source("stub:people?size=96x72&live=1&fps=200&drop=0.2");
   for (int i = 0; i < 5; ++i) {
     const auto result = live.next(kPatienceNs);
@@ -155,7 +154,7 @@ TEST_F(PredictionPipeline, ModelsTakeTurns) {
 
 TEST_F(PredictionPipeline, WhatCannotBePredictedFailsInASentence) {
   maquette::Pipeline live(context);
-  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTION_AUTO), 0.1));
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_AUTO), 0.1));
   live.set_source("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
   try {
     while (live.next(kPatienceNs)) {
@@ -170,9 +169,9 @@ TEST_F(PredictionPipeline, WhatCannotBePredictedFailsInASentence) {
 }
 
 TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
-  const maquette::Predictor right = predictor(MAQ_PREDICTION_AUTO);
-  const maquette::Surprise bits = surprise();
-  const auto refused = [&](maq_context* in, const maq_predictor* made, double ahead_s, const maq_surprise* score,
+  const maquette::Predictor right = predictor(MAQ_PREDICTOR_AUTO);
+  const maquette::Novelty bits = novelty();
+  const auto refused = [&](maq_context* in, const maq_predictor* made, double ahead_s, const maq_novelty* score,
                            const char* text) {
     maq_model* model = nullptr;
     EXPECT_EQ(maq_prediction_model_create(in, made, ahead_s, score, &model), MAQ_ERROR_INVALID_ARGUMENT);
@@ -184,7 +183,7 @@ TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
     refused(context.get(), right.get(), wrong, nullptr, "ahead_s is");
   }
   refused(context.get(), reinterpret_cast<const maq_predictor*>(bits.get()), 0.1, nullptr, "predictor");
-  refused(context.get(), right.get(), 0.1, reinterpret_cast<const maq_surprise*>(right.get()), "surprise");
+  refused(context.get(), right.get(), 0.1, reinterpret_cast<const maq_novelty*>(right.get()), "novelty");
 }
 
 }  // namespace

@@ -12,17 +12,17 @@ namespace {
 void use_codes(const void* bytes, size_t count) {
   const maq::FrameCodes codes = maq::read_code_file(bytes, count, "codes.maqc");
   const maq::NearestEntry nearest(codes);
-  const std::vector<float> features(codes.places() * codes.slices * codes.width, 0.5f);
+  const std::vector<float> features(codes.cells() * codes.groups * codes.width, 0.5f);
   std::vector<uint16_t> found(codes.count());
-  nearest.run(features.data(), codes.places(), found.data());
-  maq::CodeSurprise surprise(codes);
-  std::vector<float> bits(codes.places());
+  nearest.run(features.data(), codes.cells(), found.data());
+  maq::CodeNovelty surprise(codes);
+  std::vector<float> bits(codes.cells());
   for (int i = 0; i < 2; ++i) surprise.add(found.data(), nullptr, bits.data());
   for (const float of_place : bits) EXPECT_TRUE(of_place >= 0 && of_place < 17) << of_place;
 }
 
 TEST(CodeFiles, DamageAnywhereIsNoticed) {
-  // The head says 2 slices of 1 number each of 2 entries, 1 place.
+  // The head says 2 groups of 1 number each of 2 entries, 1 cell.
   std::string bytes = read_text(tiny_prediction::kBundle + "/codes.maqc").substr(0, 32);
   const uint32_t sizes[4] = {2, 2, 1, 1};
   bytes.append(reinterpret_cast<const char*>(sizes), sizeof sizes);

@@ -62,7 +62,7 @@ TEST(CodeHistory, JitterOfAThirdOfAPeriodChangesNothing) {
 TEST(CodeHistory, WhereFramesAreMissingThoseOfTheRightTimesAreShown) {
   // Period 7 is missing: the newest is two periods old, so that frames of two periods apart are shown.
   EXPECT_EQ(shown(history_of(at({0, 1, 2, 3, 4, 5, 6})), 8 * kPeriod_ns), (Numbers{2, 4, 6}));
-  // Of one that is missing before, nothing is shown, nor of what was before it.
+  // A missing frame is null, and so are the frames before it.
   EXPECT_EQ(shown(history_of(at({0, 1, 2, 4, 5})), 6 * kPeriod_ns), (Numbers{-1, 3, 4}));
   EXPECT_EQ(shown(history_of(at({0, 1, 2, 5})), 6 * kPeriod_ns), (Numbers{-1, -1, 3}));
 }

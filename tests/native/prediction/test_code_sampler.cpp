@@ -1,4 +1,4 @@
-// Codes that are drawn: by which numbers, how often, and at the extremes.
+// Sampled codes: random numbers, frequencies, extremes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,31 +15,31 @@ namespace {
 constexpr float kForEver = std::numeric_limits<float>::infinity(),
                 kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
-maq::DrawPosition position_of(size_t number) {
-  maq::DrawPosition position;
-  position.place = uint32_t(number % 256);
+maq::SamplePosition position_of(size_t number) {
+  maq::SamplePosition position;
+  position.cell = uint32_t(number % 256);
   position.frame = uint32_t(number / 256);
   return position;
 }
 
-// How often each code is drawn.
-std::vector<int> counts_of(const maq::SamplingSettings& settings, const std::vector<float>& logits, size_t draws) {
+// Counts the samples of each code.
+std::vector<int> counts_of(const maq::SamplingSettings& settings, const std::vector<float>& logits, size_t count) {
   maq::CodeSampler sampler(settings, logits.size());
   std::vector<int> counts(logits.size());
-  for (size_t i = 0; i < draws; ++i) ++counts[sampler.draw(logits.data(), position_of(i))];
+  for (size_t i = 0; i < count; ++i) ++counts[sampler.sample(logits.data(), position_of(i))];
   return counts;
 }
 
-uint16_t drawn(const maq::SamplingSettings& settings, const std::vector<float>& logits) {
-  return maq::CodeSampler(settings, logits.size()).draw(logits.data(), {});
+uint16_t sampled(const maq::SamplingSettings& settings, const std::vector<float>& logits) {
+  return maq::CodeSampler(settings, logits.size()).sample(logits.data(), {});
 }
 
 // Chi-square of counts against probabilities; of n codes it is n - 1 +- sqrt(2 n).
 double chi_square(const std::vector<int>& counts, const std::vector<double>& probabilities) {
-  const double draws = std::accumulate(counts.begin(), counts.end(), 0.0);
+  const double count = std::accumulate(counts.begin(), counts.end(), 0.0);
   double sum = 0;
   for (size_t i = 0; i < counts.size(); ++i) {
-    const double expected = draws * probabilities[i];
+    const double expected = count * probabilities[i];
     sum += expected > 0 ? std::pow(counts[i] - expected, 2) / expected : counts[i] * 1e9;
   }
   return sum;
@@ -94,11 +94,11 @@ TEST(CodeSampler, AtInfiniteTemperatureAllAreEquallyLikely) {
 TEST(CodeSampler, AtTemperature0AndTopK1ItIsTheLikeliestTheLowestOfEquals) {
   const std::vector<float> logits{0, 3, -1, 3, 2.9f};
   for (uint64_t seed = 0; seed < 50; ++seed) {
-    EXPECT_EQ(drawn({0, 0, seed}, logits), 1);
-    EXPECT_EQ(drawn({1, 1, seed}, logits), 1);
-    EXPECT_EQ(drawn({kForEver, 1, seed}, logits), 1);
-    EXPECT_EQ(drawn({1e-6f, 0, seed}, {0, 2, 3, 2.9f}), 2);
-    EXPECT_EQ(drawn({0, 0, seed}, std::vector<float>(7, 1.0f)), 0);
+    EXPECT_EQ(sampled({0, 0, seed}, logits), 1);
+    EXPECT_EQ(sampled({1, 1, seed}, logits), 1);
+    EXPECT_EQ(sampled({kForEver, 1, seed}, logits), 1);
+    EXPECT_EQ(sampled({1e-6f, 0, seed}, {0, 2, 3, 2.9f}), 2);
+    EXPECT_EQ(sampled({0, 0, seed}, std::vector<float>(7, 1.0f)), 0);
   }
 }
 
@@ -120,10 +120,10 @@ TEST(CodeSampler, TopKKeepsTheLikeliestTheLowestOfEqualsFirst) {
 }
 
 TEST(CodeSampler, HugeAndInfiniteLogitsAreStableAndNaNIsTold) {
-  EXPECT_EQ(drawn({}, {-1e4f, 1e4f, 0}), 1);
-  EXPECT_EQ(drawn({1e6f, 1, 0}, {-1e4f, 1e4f, 0}), 1);
-  EXPECT_EQ(drawn({}, {3, kForEver, 1e30f}), 1);
-  EXPECT_EQ(drawn({kForEver, 0, 0}, {3, kForEver, 1e30f}), 1);
+  EXPECT_EQ(sampled({}, {-1e4f, 1e4f, 0}), 1);
+  EXPECT_EQ(sampled({1e6f, 1, 0}, {-1e4f, 1e4f, 0}), 1);
+  EXPECT_EQ(sampled({}, {3, kForEver, 1e30f}), 1);
+  EXPECT_EQ(sampled({kForEver, 0, 0}, {3, kForEver, 1e30f}), 1);
   const std::vector<int> of_two = counts_of({}, {kForEver, 5, kForEver}, 10000);
   EXPECT_LT(chi_square(of_two, {0.5, 0, 0.5}), 20);
   const std::vector<int> without = counts_of({kForEver, 0, 0}, {1, -kForEver, 2, -kForEver}, 10000);
@@ -131,24 +131,24 @@ TEST(CodeSampler, HugeAndInfiniteLogitsAreStableAndNaNIsTold) {
   const std::vector<int> of_none = counts_of({}, std::vector<float>(4, -kForEver), 10000);
   EXPECT_LT(chi_square(of_none, std::vector<double>(4, 0.25)), 25);
   for (const float temperature : {0.0f, 1.0f, kForEver}) {
-    expect_error(MAQ_ERROR_INFERENCE, "NaN", [&] { drawn({temperature, 0, 0}, {1, 2, kNotANumber}); });
+    expect_error(MAQ_ERROR_INFERENCE, "NaN", [&] { sampled({temperature, 0, 0}, {1, 2, kNotANumber}); });
   }
 }
 
 TEST(CodeSampler, EveryPositionAndSeedHasANumberOfItsOwn) {
   const std::vector<float> even(512, 0.0f);
   maq::CodeSampler sampler({}, 512);
-  const uint16_t first = sampler.draw(even.data(), {});
-  EXPECT_EQ(sampler.draw(even.data(), {}), first);
+  const uint16_t first = sampler.sample(even.data(), {});
+  EXPECT_EQ(sampler.sample(even.data(), {}), first);
   int equal = 0;
   for (int i = 1; i <= 100; ++i) {
-    maq::DrawPosition changed[5];
+    maq::SamplePosition changed[5];
     changed[0].stream = changed[1].frame = uint32_t(i);
-    changed[2].sample = changed[3].slice = uint16_t(i);
-    changed[4].place = uint32_t(i);
-    for (const maq::DrawPosition& position : changed) equal += sampler.draw(even.data(), position) == first ? 1 : 0;
+    changed[2].sample = changed[3].group = uint16_t(i);
+    changed[4].cell = uint32_t(i);
+    for (const maq::SamplePosition& position : changed) equal += sampler.sample(even.data(), position) == first ? 1 : 0;
     maq::CodeSampler other({1, 0, uint64_t(i) << 32}, 512);
-    equal += other.draw(even.data(), {}) == first ? 1 : 0;
+    equal += other.sample(even.data(), {}) == first ? 1 : 0;
   }
   EXPECT_LE(equal, 8) << "of 600; one of 512 by chance";
 }

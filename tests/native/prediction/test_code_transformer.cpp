@@ -1,6 +1,7 @@
-// How likely codes are by the transformer: what torch says, and extreme numbers.
+// Probabilities of codes by the transformer: equal to torch, and extreme numbers.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -17,6 +18,8 @@ using tiny_transformer::floats_of;
 using tiny_transformer::kBundle;
 using tiny_transformer::kCodes;
 
+std::atomic<bool> never{false};  // not cancelled
+
 constexpr float kInfiniteLogit = std::numeric_limits<float>::infinity(),
                 kNoLogit = std::numeric_limits<float>::quiet_NaN();
 
@@ -26,7 +29,7 @@ std::vector<float> bits_of(maq::CodeTransformer& transformer, int number) {
   return bits;
 }
 
-TEST(CodeTransformer, BitsAreThoseOfTorchAlsoWhereFramesBeforeAreUnseen) {
+TEST(CodeTransformer, BitsEqualTorchAlsoWithoutContextFrames) {
   const std::vector<float> expected = floats_of("foreseen.f32");
   for (const int threads : {1, 2}) {
     const auto transformer = tiny_transformer::open(kBundle, threads);
@@ -45,13 +48,13 @@ TEST(CodeTransformer, ACodeChangesTheBitsOfThoseAfterItAndNoneBefore) {
   const auto transformer = tiny_transformer::open();
   const std::vector<float> whole = bits_of(*transformer, 3);
   std::vector<uint16_t> changed(codes(3), codes(3) + kCodes);
-  constexpr size_t kAt = 2 * 100;  // the first slice of place 100
+  constexpr size_t kAt = 2 * 100;  // the first group of cell 100
   changed[kAt] = uint16_t((changed[kAt] + 7) % 16);
   std::vector<float> found(kCodes);
   transformer->bits(before(3), changed.data(), found.data());
   for (size_t i = 0; i < kAt; ++i) ASSERT_EQ(found[i], whole[i]) << i;
-  EXPECT_NE(found[kAt + 1], whole[kAt + 1]) << "the slice after it";
-  EXPECT_NE(found[kAt + 2], whole[kAt + 2]) << "the place after it";
+  EXPECT_NE(found[kAt + 1], whole[kAt + 1]) << "the group after it";
+  EXPECT_NE(found[kAt + 2], whole[kAt + 2]) << "the cell after it";
 }
 
 TEST(CodeTransformer, TheStepInTimeCountsWithinWhatItWasTrainedOn) {
@@ -81,29 +84,29 @@ TEST(CodeTransformer, StreamsOnSeveralThreadsDoNotDependOnEachOther) {
   for (std::thread& thread : threads) thread.join();
 }
 
-TEST(CodeTransformer, DrawnPlaceAfterPlaceTheLikeliestCodesAreThoseOfPython) {
+TEST(CodeTransformer, TheLikeliestCodesEqualPython) {
   const auto transformer = tiny_transformer::open();
   const std::string expected = read_text(tiny_transformer::kFolder + "/likeliest.u8");
   for (const size_t samples : {1u, 3u, 1u}) {
     std::vector<uint16_t> found(samples * kCodes);
     const std::vector<maq::CodesBefore> each(samples, before(3));
-    transformer->draw(each, {0, 0, 0}, 0, 0, 0, found.data(), nullptr);
+    transformer->sample(each, {0, 0, 0}, 0, 0, never, found.data(), nullptr);
     for (size_t i = 0; i < found.size(); ++i) ASSERT_EQ(found[i], uint8_t(expected[i % kCodes])) << samples << " " << i;
   }
 }
 
-struct DrawnFrame {
+struct SampledCodes {
   std::vector<uint16_t> codes;
   std::vector<float> entropy;
 };
 
 // Sample by sample.
-std::vector<DrawnFrame> drawn_after(maq::CodeTransformer& transformer, const std::vector<maq::CodesBefore>& each,
-                                    const maq::SamplingSettings& sampling, size_t passes = 0, uint32_t frame = 1) {
+std::vector<SampledCodes> sampled_after(maq::CodeTransformer& transformer, const std::vector<maq::CodesBefore>& each,
+                                        const maq::SamplingSettings& sampling, uint32_t frame = 1) {
   std::vector<uint16_t> codes(each.size() * kCodes);
   std::vector<float> entropy(codes.size());
-  transformer.draw(each, sampling, 7, frame, passes, codes.data(), entropy.data());
-  std::vector<DrawnFrame> found;
+  transformer.sample(each, sampling, 7, frame, never, codes.data(), entropy.data());
+  std::vector<SampledCodes> found;
   for (auto at = std::ptrdiff_t(0); at < std::ptrdiff_t(codes.size()); at += std::ptrdiff_t(kCodes)) {
     const auto end = at + std::ptrdiff_t(kCodes);
     found.push_back({{codes.begin() + at, codes.begin() + end}, {entropy.begin() + at, entropy.begin() + end}});
@@ -111,13 +114,13 @@ std::vector<DrawnFrame> drawn_after(maq::CodeTransformer& transformer, const std
   return found;
 }
 
-TEST(CodeTransformer, ASampleDependsOnNoOtherAlsoWhereTheyGoOnFromOtherFrames) {
+TEST(CodeTransformer, ASampleDependsOnNoOtherAlsoWithOtherContexts) {
   const auto transformer = tiny_transformer::open();
   const maq::SamplingSettings sampling{1, 0, 5};
-  const std::vector<DrawnFrame> alone = drawn_after(*transformer, {before(3)}, sampling),
-                                of_four =
-                                    drawn_after(*transformer, {before(3), before(5), before(3), before(3)}, sampling),
-                                others = drawn_after(*transformer, {before(2), before(5), before(4)}, sampling);
+  const std::vector<SampledCodes> alone = sampled_after(*transformer, {before(3)}, sampling),
+                                  of_four = sampled_after(*transformer, {before(3), before(5), before(3), before(3)},
+                                                          sampling),
+                                  others = sampled_after(*transformer, {before(2), before(5), before(4)}, sampling);
   EXPECT_EQ(of_four[0].codes, alone[0].codes);
   EXPECT_EQ(of_four[1].codes, others[1].codes);
   EXPECT_NE(of_four[2].codes, of_four[0].codes) << "numbers of its own";
@@ -125,61 +128,45 @@ TEST(CodeTransformer, ASampleDependsOnNoOtherAlsoWhereTheyGoOnFromOtherFrames) {
   EXPECT_NE(others[0].codes, alone[0].codes) << "after other frames";
 }
 
-TEST(CodeTransformer, PassesThatSettleGiveWhatPlaceAfterPlaceGives) {
-  const auto transformer = tiny_transformer::open();
-  for (const maq::SamplingSettings& sampling : {maq::SamplingSettings{0, 0, 0}, {1, 0, 5}, {0.5f, 4, 9}}) {
-    const std::vector<maq::CodesBefore> each{before(3), before(5)};
-    const std::vector<DrawnFrame> exact = drawn_after(*transformer, each, sampling),
-                                  once = drawn_after(*transformer, each, sampling, 1),
-                                  settled = drawn_after(*transformer, each, sampling, 300);
-    for (size_t s = 0; s < each.size(); ++s) {
-      EXPECT_EQ(settled[s].codes, exact[s].codes);
-      // Each pass adds at least a place that is as it will stay.
-      EXPECT_TRUE(std::equal(exact[s].codes.begin(), exact[s].codes.begin() + 2, once[s].codes.begin()));
-      for (size_t i = 0; i < kCodes; ++i) ASSERT_NEAR(settled[s].entropy[i], exact[s].entropy[i], 1e-3) << i;
-    }
-  }
-}
-
-TEST(CodeTransformer, TheMeanOfTheBitsOfWhatIsDrawnIsTheEntropy) {
+TEST(CodeTransformer, TheMeanBitsOfSamplesAreTheEntropy) {
   const auto transformer = tiny_transformer::open();
   double entropy = 0, bits = 0, squares = 0;
   std::vector<float> of_codes(kCodes);
-  constexpr uint32_t kDrawnFrames = 4;
-  for (uint32_t frame = 0; frame < kDrawnFrames; ++frame) {
+  constexpr uint32_t kSampledCodess = 4;
+  for (uint32_t frame = 0; frame < kSampledCodess; ++frame) {
     const std::vector<maq::CodesBefore> each(4, before(3));
-    for (const DrawnFrame& drawn : drawn_after(*transformer, each, {1, 0, 2}, 0, frame)) {
-      transformer->bits(before(3), drawn.codes.data(), of_codes.data());
+    for (const SampledCodes& sampled : sampled_after(*transformer, each, {1, 0, 2}, frame)) {
+      transformer->bits(before(3), sampled.codes.data(), of_codes.data());
       for (size_t i = 0; i < kCodes; ++i) {
-        entropy += double(drawn.entropy[i]);
+        entropy += double(sampled.entropy[i]);
         bits += double(of_codes[i]);
-        squares += std::pow(double(of_codes[i] - drawn.entropy[i]), 2);
+        squares += std::pow(double(of_codes[i] - sampled.entropy[i]), 2);
       }
     }
   }
-  EXPECT_NEAR(bits, entropy, 5 * std::sqrt(squares)) << "of what is drawn one after another";
-  EXPECT_GT(entropy / (4 * kDrawnFrames * kCodes), 0.5);
+  EXPECT_NEAR(bits, entropy, 5 * std::sqrt(squares)) << "of what is sampled one after another";
+  EXPECT_GT(entropy / (4 * kSampledCodess * kCodes), 0.5);
 }
 
-TEST(CodeTransformer, DrawnCodesHaveTheBitsThatWereForeseen) {
+TEST(CodeTransformer, SampledCodesHaveThePredictedBits) {
   const auto transformer = tiny_transformer::open();
   const std::vector<maq::CodesBefore> both(2, before(3));
-  std::vector<uint16_t> drawn(2 * kCodes), again(2 * kCodes);
+  std::vector<uint16_t> sampled(2 * kCodes), again(2 * kCodes);
   std::vector<float> bits(kCodes);
   double total = 0;
   for (uint32_t frame = 0; frame < 4; ++frame) {
-    transformer->draw(both, {1, 0, 11}, 0, frame, 0, drawn.data(), nullptr);
-    transformer->draw(both, {1, 0, 11}, 0, frame, 0, again.data(), nullptr);
-    EXPECT_EQ(drawn, again);
-    EXPECT_FALSE(std::equal(drawn.begin(), drawn.begin() + kCodes, drawn.begin() + kCodes)) << "samples differ";
+    transformer->sample(both, {1, 0, 11}, 0, frame, never, sampled.data(), nullptr);
+    transformer->sample(both, {1, 0, 11}, 0, frame, never, again.data(), nullptr);
+    EXPECT_EQ(sampled, again);
+    EXPECT_FALSE(std::equal(sampled.begin(), sampled.begin() + kCodes, sampled.begin() + kCodes)) << "samples differ";
     for (size_t sample = 0; sample < 2; ++sample) {
-      transformer->bits(before(3), drawn.data() + sample * kCodes, bits.data());
+      transformer->bits(before(3), sampled.data() + sample * kCodes, bits.data());
       for (const float of_code : bits) total += double(of_code) / (8 * kCodes);
     }
-    transformer->draw(both, {1, 0, 12}, 0, frame, 0, again.data(), nullptr);
-    EXPECT_NE(drawn, again) << "another seed";
+    transformer->sample(both, {1, 0, 12}, 0, frame, never, again.data(), nullptr);
+    EXPECT_NE(sampled, again) << "another seed";
   }
-  // The mean of what is drawn is the entropy, which is near the bits of frames that were like those in training.
+  // The mean of what is sampled is the entropy, which is near the bits of frames that were like those in training.
   double uniform = 0;
   std::vector<uint16_t> any(kCodes);
   std::mt19937 random(1);
@@ -190,40 +177,41 @@ TEST(CodeTransformer, DrawnCodesHaveTheBitsThatWereForeseen) {
   EXPECT_GT(uniform, total + 1) << "codes at random";
 }
 
-TEST(CodeTransformer, OfKeptKeysAndValuesNothingOldIsSeen) {
+TEST(CodeTransformer, OldKeysAndValuesAreNotSeen) {
   const maq::TransformerBundle parts{maq::CodeBundle(maq::read_bundle(kBundle))};
   const maq::TransformerTables& tables = parts.tables;
   const std::vector<float> bias = maq::causal_bias(tables), expected = floats_of("foreseen.f32");
   const auto context = parts.context.open(tiny_prediction::runtime(), {});
-  std::vector<float> summed(tables.places() * tables.embedding);
+  std::vector<float> summed(tables.cells() * tables.embedding);
   const float time_step = 0;  // log2 of 10 / fps
   const auto embedding = int64_t(tables.embedding), width = int64_t(tables.width);
-  maq::PlaceSteps steps(tiny_prediction::runtime(), parts, bias, 1, {});
+  maq::DecodingSteps steps(tiny_prediction::runtime(), parts, bias, 1, {});
   for (int number = 1; number < 4; ++number) {
     steps.fill_kept(kNoLogit);
     steps.begin();
-    maq::sum_context_rows(tables, before(number).frames, summed.data());
+    maq::sum_context_embeddings(tables, before(number).frames, summed.data());
     const float* const seen =
         context->run({{summed.data(), {1, 256, embedding}}, {&time_step, {1, 1}}}, {{1, 256, width}})[0].data;
-    for (size_t place = 0; place < 256; ++place) {
-      steps.see(place, &seen);
-      const uint16_t* const known = codes(number) + place * tables.slices;
-      for (size_t k = 0; k < tables.slices; ++k) {
+    for (size_t cell = 0; cell < 256; ++cell) {
+      steps.run(cell, &seen);
+      const uint16_t* const known = codes(number) + cell * tables.groups;
+      for (size_t k = 0; k < tables.groups; ++k) {
         const float* const logits = steps.logits(k, &known);
         std::vector<float> with_prior(logits, logits + tables.entries);
-        const size_t i = place * tables.slices + k;
+        const size_t i = cell * tables.groups + k;
         const size_t row = k * tables.entries + before(number).newest[i];
-        maq::add_stored_prior(parts.codes->after_bits.data() + row * tables.entries, tables.entries, with_prior.data());
+        maq::add_stored_prior(parts.codes->bigram_bits.data() + row * tables.entries, tables.entries,
+                              with_prior.data());
         ASSERT_NEAR(maq::bits_of_code(with_prior.data(), tables.entries, known[k]),
                     expected[size_t(number - 1) * kCodes + i], 1.5e-4)
             << number << " " << i;
       }
-      steps.set(place, &known);
+      steps.set(cell, &known);
     }
   }
 }
 
-TEST(CodeTransformer, BitsOfACodeAreThoseOfFloat64) {
+TEST(CodeTransformer, BitsOfACodeEqualFloat64) {
   std::mt19937 random(5);
   for (const size_t entries : {1u, 2u, 7u, 16u, 33u, 512u}) {
     for (const float scale : {0.0f, 0.1f, 5.0f, 1e4f}) {
@@ -243,7 +231,7 @@ TEST(CodeTransformer, BitsOfACodeAreThoseOfFloat64) {
   }
 }
 
-TEST(CodeTransformer, EntropyIsThatOfFloat64) {
+TEST(CodeTransformer, EntropyEqualsFloat64) {
   std::mt19937 random(6);
   for (const size_t entries : {1u, 7u, 33u, 512u}) {
     for (const float scale : {0.0f, 0.1f, 5.0f, 1e4f}) {

@@ -13,7 +13,7 @@ using tiny_prediction::kFolder;
 
 std::vector<uint16_t> codes_of(maq::FrameEncoder& encoder, const maq::Frame& frame) {
   std::vector<uint16_t> codes(encoder.codes().count());
-  encoder.run(frame.image, codes.data());
+  encoder.encode(frame.image, codes.data());
   return codes;
 }
 
@@ -44,7 +44,7 @@ TEST(FrameCodes, ThePictureOfThemIsThatOfTorch) {
   for (size_t i = 0; i < of_torch.size(); ++i) of_torch[i] = uint8_t(codes[i]);
   std::vector<uint8_t> rgb(64 * 64 * 3);
   for (int again = 0; again < 2; ++again) {
-    decoder.run(of_torch.data(), rgb.data());
+    decoder.decode(of_torch.data(), rgb.data());
     double squares = 0;
     for (size_t i = 0; i < rgb.size(); ++i) {
       float expected;

@@ -1,5 +1,5 @@
 // Nearest entries: against float64, ties, NaN.
-#include "prediction/codes/nearest_entry.h"
+#include "prediction/codec/nearest_entry.h"
 
 #include <gtest/gtest.h>
 
@@ -10,12 +10,12 @@
 
 namespace {
 
-maq::FrameCodes random_codes(size_t slices, size_t entries, size_t width, size_t side, unsigned seed) {
+maq::FrameCodes random_codes(size_t groups, size_t entries, size_t width, size_t side, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
   maq::FrameCodes codes;
-  codes.slices = slices, codes.entries = entries, codes.width = width, codes.side = side;
-  codes.vectors.resize(slices * entries * width);
+  codes.groups = groups, codes.entries = entries, codes.width = width, codes.side = side;
+  codes.vectors.resize(groups * entries * width);
   for (float& value : codes.vectors) value = normal(random);
   return codes;
 }
@@ -25,26 +25,26 @@ TEST(NearestEntry, IsThatOfFloat64ForEverySize) {
   std::normal_distribution<float> normal;
   for (const std::array<size_t, 4>& sizes :
        {std::array<size_t, 4>{4, 512, 32, 16}, {1, 1, 1, 1}, {3, 17, 5, 2}, {2, 15, 7, 3}, {1, 1024, 2, 5}}) {
-    const size_t slices = sizes[0], entries = sizes[1], width = sizes[2];
-    const maq::FrameCodes codes = random_codes(slices, entries, width, sizes[3], 3);
-    std::vector<float> features(codes.places() * slices * width);
+    const size_t groups = sizes[0], entries = sizes[1], width = sizes[2];
+    const maq::FrameCodes codes = random_codes(groups, entries, width, sizes[3], 3);
+    std::vector<float> features(codes.cells() * groups * width);
     for (float& value : features) value = normal(random);
     std::vector<uint16_t> found(codes.count());
-    maq::NearestEntry(codes).run(features.data(), codes.places(), found.data());
-    for (size_t place = 0; place < codes.places(); ++place) {
-      for (size_t slice = 0; slice < slices; ++slice) {
+    maq::NearestEntry(codes).run(features.data(), codes.cells(), found.data());
+    for (size_t cell = 0; cell < codes.cells(); ++cell) {
+      for (size_t group = 0; group < groups; ++group) {
         const auto distance = [&](size_t entry) {
           double sum = 0;
           for (size_t i = 0; i < width; ++i) {
-            const double difference = double(features[(place * slices + slice) * width + i]) -
-                                      double(codes.vectors[(slice * entries + entry) * width + i]);
+            const double difference = double(features[(cell * groups + group) * width + i]) -
+                                      double(codes.vectors[(group * entries + entry) * width + i]);
             sum += difference * difference;
           }
           return sum;
         };
         double least = std::numeric_limits<double>::infinity();
         for (size_t entry = 0; entry < entries; ++entry) least = std::min(least, distance(entry));
-        EXPECT_LE(distance(found[place * slices + slice]), least + 1e-5) << place << " " << slice;
+        EXPECT_LE(distance(found[cell * groups + group]), least + 1e-5) << cell << " " << group;
       }
     }
   }

@@ -1,5 +1,5 @@
 // Displacements kept in half of their memory.
-#include "prediction/packed_flow.h"
+#include "prediction/flow/packed_flow.h"
 
 #include <gtest/gtest.h>
 

@@ -68,19 +68,19 @@ TEST_F(TransformerBundles, WithOtherGraphsAreRefused) {
 }
 
 void use_rows(const void* bytes, size_t count) {
-  const maq::TransformerTables tables = maq::read_row_file(bytes, count, "transformer.maqr");
-  std::vector<float> sum(tables.places() * tables.embedding), near(maq::kNearCodes * tables.embedding),
+  const maq::TransformerTables tables = maq::read_embedding_file(bytes, count, "transformer.maqr");
+  std::vector<float> sum(tables.cells() * tables.embedding), near(maq::kNearCodes * tables.embedding),
       earlier(tables.width);
-  const std::vector<uint16_t> last(tables.places() * tables.slices, uint16_t(tables.entries - 1));
+  const std::vector<uint16_t> last(tables.cells() * tables.groups, uint16_t(tables.entries - 1));
   maq::ContextFrames frames{};
   for (size_t frame = 0; frame < tables.frames; ++frame) frames[frame] = last.data();
-  maq::sum_context_rows(tables, frames, sum.data());
-  maq::SliceRows rows(tables);
-  for (size_t place = 0; place < tables.places(); ++place) {
-    rows.set(place, last.data());
-    rows.near(place, near.data());
+  maq::sum_context_embeddings(tables, frames, sum.data());
+  maq::GroupEmbeddings rows(tables);
+  for (size_t cell = 0; cell < tables.cells(); ++cell) {
+    rows.set(cell, last.data());
+    rows.near(cell, near.data());
   }
-  for (size_t of = 0; of < tables.slices; ++of) maq::sum_earlier_rows(tables, of, last.data(), earlier.data());
+  for (size_t of = 0; of < tables.groups; ++of) maq::sum_earlier_embeddings(tables, of, last.data(), earlier.data());
 }
 
 TEST_F(TransformerBundles, RowsThatAreDamagedOrMadeToDoHarmAreRefusedOrHarmless) {
@@ -101,14 +101,14 @@ TEST_F(TransformerBundles, RowsThatAreDamagedOrMadeToDoHarmAreRefusedOrHarmless)
 TEST_F(TransformerBundles, RowsInBytesAreNearThoseInFloats) {
   const std::string wide = read_text(kBundle + "/transformer.maqr"),
                     narrow = read_text(tiny_transformer::kFolder + "/rows_in_bytes.maqr");
-  const maq::TransformerTables one = maq::read_row_file(wide.data(), wide.size(), "one"),
-                               other = maq::read_row_file(narrow.data(), narrow.size(), "other");
-  ASSERT_EQ(one.context_rows.size(), other.context_rows.size());
-  for (size_t row = 0; row < one.context_rows.size(); row += one.embedding) {
+  const maq::TransformerTables one = maq::read_embedding_file(wide.data(), wide.size(), "one"),
+                               other = maq::read_embedding_file(narrow.data(), narrow.size(), "other");
+  ASSERT_EQ(one.context_embeddings.size(), other.context_embeddings.size());
+  for (size_t row = 0; row < one.context_embeddings.size(); row += one.embedding) {
     float largest = 0;
-    for (size_t i = row; i < row + one.embedding; ++i) largest = std::max(largest, std::abs(one.context_rows[i]));
+    for (size_t i = row; i < row + one.embedding; ++i) largest = std::max(largest, std::abs(one.context_embeddings[i]));
     for (size_t i = row; i < row + one.embedding; ++i) {
-      ASSERT_NEAR(one.context_rows[i], other.context_rows[i], largest / 254 * 1.001f) << i;
+      ASSERT_NEAR(one.context_embeddings[i], other.context_embeddings[i], largest / 254 * 1.001f) << i;
     }
   }
   EXPECT_EQ(one.row_bias, other.row_bias);

@@ -52,25 +52,29 @@ def test_the_last_frame_is_one_method_and_captured_frames_have_no_origin():
     assert frame.origin is None
 
 
-def test_samples_are_drawn_each_by_itself_and_say_where_they_are_uncertain():
-    with maquette.Predictor("network", network_mode=3, temperature=1, seed=2, threads=1) as predictor:
+def test_samples_depend_on_the_seed_alone_and_have_an_entropy_map():
+    with maquette.Predictor("sampled", temperature=1, seed=2, threads=1) as predictor:
         for number in range(4):
             predictor.push(textured(STEP_PX * number), time_s=number * PERIOD_S)
-        predictor.draw(3, 2, PERIOD_S)
+        predictor.sample(3, 2, PERIOD_S)
+        frame, bits = predictor.acquire_sample(1, 2), predictor.entropy_map(1, 2)
         stats = predictor.stats
-        assert maquette.prediction.NETWORK_MODES[int(stats["network_mode"])] == "drawn"
-        assert (stats["drawn_count"], stats["step_count"], stats["pass_count"]) == (6, 2 * 256, 0)
-        frame, bits = predictor.drawn(1, 2), predictor.uncertainty(1, 2)
+        assert maquette.prediction.METHODS[int(stats["method"])] == "sampled"
+        assert (stats["sampled_frame_count"], stats["step_count"]) == (6, 2 * 256)
         assert frame.origin.horizon_s == pytest.approx(2 * PERIOD_S)
         assert bits.shape == (16, 16)
         assert bits.dtype == np.float32
         assert 0.3 < bits.mean() < 9
-        assert not np.array_equal(frame.pixels(), predictor.drawn(0, 2).pixels())
-        predictor.draw(2, 2, PERIOD_S)  # of the shipped networks, in int8
-        assert np.array_equal(frame.pixels(), predictor.drawn(1, 2).pixels())
-        assert np.array_equal(bits, predictor.uncertainty(1, 2))
+        assert not np.array_equal(frame.pixels(), predictor.acquire_sample(0, 2).pixels())
+        predictor.sample(2, 2, PERIOD_S)  # of the shipped networks, in int8
+        assert np.array_equal(frame.pixels(), predictor.acquire_sample(1, 2).pixels())
+        assert np.array_equal(bits, predictor.entropy_map(1, 2))
         with pytest.raises(maquette.MaquetteError, match="of 2 samples"):
-            predictor.drawn(2, 1)
+            predictor.acquire_sample(2, 1)
+        predictor.cancel()
+        with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
+            predictor.sample(1, 1, PERIOD_S)
+        predictor.sample(1, 1, PERIOD_S)
 
 
 def test_a_predictor_that_has_forgotten_its_frames_asks_for_one(moving):
@@ -94,7 +98,7 @@ def test_wrong_settings_are_named():
         maquette.Predictor(pool=3)
 
 
-def test_gaps_are_bridged_by_frames_that_say_so():
+def test_gaps_are_filled_with_frames_that_are_marked():
     source = maquette.Source("stub:people?count=1&size=160x120&fps=20&drop=0.3&frames=60&live=1", loop=0)
     with maquette.Concealer(source, threads=1) as concealer:
         with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_BUSY"):
@@ -122,34 +126,34 @@ def test_only_live_sources_have_gaps():
         maquette.Concealer(maquette.Source("stub:people?frames=3"))
 
 
-def test_what_changes_is_surprising_where_it_changes():
-    surprise = maquette.Surprise(threads=1)
-    assert surprise.push(textured(0), time_s=0).is_start
+def test_a_change_is_novel_in_its_cells():
+    novelty = maquette.Novelty(threads=1)
+    assert novelty.push(textured(0), time_s=0).is_stream_start
     for number in range(1, 12):
-        still = surprise.push(textured(0), time_s=number * PERIOD_S)
+        still = novelty.push(textured(0), time_s=number * PERIOD_S)
     assert still.bits < 0.1
     assert not still.is_event
 
     changed = textured(0)
     changed[60:90, 80:120] = 255 - changed[60:90, 80:120]
-    score = surprise.push(changed, time_s=12 * PERIOD_S)
+    score = novelty.push(changed, time_s=12 * PERIOD_S)
     assert score.map.shape == (16, 16)
     assert score.map.mean() == pytest.approx(score.bits, rel=1e-4)
     row, column = np.unravel_index(score.map.argmax(), score.map.shape)
     assert 8 <= row <= 11
     assert 8 <= column <= 11
     assert score.ratio > 2
-    assert surprise.stats["pushed_count"] == 13
+    assert novelty.stats["pushed_count"] == 13
 
 
 def test_streams_share_networks():
-    first = maquette.Surprise(threads=1)
-    second = maquette.Surprise(networks_of=first)
+    first = maquette.Novelty(threads=1)
+    second = maquette.Novelty(shared_with=first)
     bits = [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)]
     first.close()
     second.reset()
     assert [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)] == bits
     with pytest.raises(TypeError, match="event_ratio"):
-        maquette.Surprise(event_rate=2)
+        maquette.Novelty(event_rate=2)
     with pytest.raises(ValueError, match="time_s"):
         second.push(textured(0))

@@ -70,9 +70,9 @@ def stream_bits(net: LatentTransformer, stored: FrameCodes, codes: torch.Tensor,
     return bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy(), np.stack(foreseen)).mean(1)
 
 
-def bits_of(surprise: maquette.Surprise, frames: np.ndarray) -> np.ndarray:
+def bits_of(novelty: maquette.Novelty, frames: np.ndarray) -> np.ndarray:
     """[T - 1, 16, 16]."""
-    return np.stack([surprise.push(np.ascontiguousarray(f), time_s=t / FPS).map for t, f in enumerate(frames)])[1:]
+    return np.stack([novelty.push(np.ascontiguousarray(f), time_s=t / FPS).map for t, f in enumerate(frames)])[1:]
 
 
 def test_cells_have_the_bits_of_torch_with_what_motion_foresees(made):
@@ -82,22 +82,22 @@ def test_cells_have_the_bits_of_torch_with_what_motion_foresees(made):
     motion[2:] = autoencoder.encode(torch.from_numpy(pictures[1:-1]))
     expected = stream_bits(net, stored, codes, motion)
     without = stream_bits(net, stored, codes, torch.full_like(codes, UNSEEN))
-    surprise = maquette.Surprise(bundle_path=folder, threads=1)
-    found = bits_of(surprise, frames)
+    novelty = maquette.Novelty(bundle_path=folder, threads=1)
+    found = bits_of(novelty, frames)
     # Every cell depends on all codes of three frames; one in a thousand of these may differ by a near tie.
     assert np.median(np.abs(found - expected)) < 1e-3
     assert np.mean(np.abs(found - expected) < 0.02) >= 0.99
     assert np.median(np.abs(found - without)[2:]) > 0.01, "what motion foresees is seen"
-    assert surprise.stats["transformer_ms"] > 0
+    assert novelty.stats["transformer_ms"] > 0
 
 
 def test_the_table_alone_can_be_asked_for(made):
     folder, _, _, stored, frames, codes = made
-    surprise = maquette.Surprise(bundle_path=folder, threads=1, method="table")
+    novelty = maquette.Novelty(bundle_path=folder, threads=1, method="bigram")
     expected = bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy()).mean(1)
-    assert np.mean(np.abs(bits_of(surprise, frames) - expected) < 1e-3) >= 0.99
-    assert surprise.stats["transformer_ms"] == 0
-    sharing = maquette.Surprise(networks_of=surprise)
+    assert np.mean(np.abs(bits_of(novelty, frames) - expected) < 1e-3) >= 0.99
+    assert novelty.stats["transformer_ms"] == 0
+    sharing = maquette.Novelty(shared_with=novelty)
     assert np.mean(np.abs(bits_of(sharing, frames) - expected) < 1e-3) >= 0.99
 
 
@@ -105,13 +105,13 @@ def test_samples_of_a_seed_are_those_of_the_reference(made):
     folder, autoencoder, _, stored, frames, codes = made
     seen, made_frames, seed = 5, 2, 11
     predictor = maquette.Predictor(
-        "network", network_mode=3, bundle_path=folder, temperature=1, seed=seed, threads=1
+        "sampled", bundle_path=folder, temperature=1, seed=seed, threads=1
     )  # fmt: skip
     base = maquette.Predictor("motion", threads=1)
     for t in range(seen):
         predictor.push(np.ascontiguousarray(frames[t]), time_s=t / FPS)
         base.push(np.ascontiguousarray(frames[t]), time_s=t / FPS)
-    predictor.draw(2, made_frames, 1 / FPS)
+    predictor.sample(2, made_frames, 1 / FPS)
     tables = read_transformer_file(folder / TRANSFORMER)
     runtime = GraphRuntime(folder, tables, prior_of(stored))
     for sample in range(2):
@@ -127,6 +127,6 @@ def test_samples_of_a_seed_are_those_of_the_reference(made):
                 return drawn_code(logits.astype(np.float32), 1, seed, seen, number, sample, place, k)
 
             before = [*before[1:], runtime.chosen(chosen)]
-            found = predictor.uncertainty(sample, number)
+            found = predictor.entropy_map(sample, number)
             # A place depends on all codes before it: one that differed would change most of those after it.
             assert np.mean(np.abs(found - entropy.mean(0).reshape(16, 16)) < 2e-3) >= 0.99, (sample, number)

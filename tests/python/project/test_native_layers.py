@@ -27,8 +27,9 @@ SYSTEMS = (
     | CURVES
     | HEAD
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/reconstruction", "head/bundle",
-       "head/files", "head/render", "prediction", "prediction/codes", "prediction/networks", "prediction/surprise",
-       "prediction/transformer", "sources", "sources/recording"}
+       "head/files", "head/render", "prediction", "prediction/blend", "prediction/codec", "prediction/flow",
+       "prediction/novelty", "prediction/refine", "prediction/sampling", "prediction/transformer", "sources",
+       "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
     "core": set(),
@@ -58,10 +59,15 @@ MAY_INCLUDE = {
     "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
     "head/registration": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
-    "prediction/codes": BASE,
-    "prediction/networks": BASE | {"prediction", "prediction/codes", "prediction/transformer"},
-    "prediction/surprise": BASE | {"prediction/codes", "prediction/transformer"},
-    "prediction/transformer": BASE | {"prediction", "prediction/codes"},
+    "prediction/flow": {"core", "image"},
+    "prediction/blend": {"core", "image", "prediction", "prediction/flow"},
+    "prediction/codec": BASE,
+    "prediction/transformer": BASE | {"prediction", "prediction/blend", "prediction/codec"},
+    "prediction/novelty": BASE | {"prediction/codec", "prediction/transformer"},
+    "prediction/refine": BASE | {"prediction", "prediction/blend", "prediction/codec", "prediction/flow",
+                                 "prediction/transformer"},
+    "prediction/sampling": BASE | {"prediction", "prediction/blend", "prediction/codec", "prediction/flow",
+                                   "prediction/transformer"},
     "scene": BASE - {"nn"},
     "scene/capture": CAPTURE,
     "scene/networks": CAPTURE,
@@ -78,12 +84,13 @@ MAY_INCLUDE = {
     "sources/recording": BACKEND,
     "sources/files": BACKEND,
     "sources/synthetic": BACKEND | {"sources/recording"},
-    "concealment": BASE - {"nn"} | {"prediction", "sources"},
+    "concealment": BASE - {"nn"} | {"prediction", "prediction/blend", "sources"},
     "pipeline": {"core", "core/trace", "image", "sources", "sources/recording"},
-    "api": SYSTEMS | {"concealment", "pipeline"},
+    "api": SYSTEMS | {"pipeline"},
     "api/densepose": BASE | {"api", "densepose", "pipeline"},
     "api/edges": BASE | CURVES | {"api", "edges/files", "edges/fusion", "edges/measuring", "pipeline"},
     "api/head": SYSTEMS | {"api"},
+    "api/prediction": SYSTEMS | {"api", "concealment", "pipeline"},
     "api/scene": SCENE | {"api"},
 }  # fmt: skip
 
@@ -96,6 +103,7 @@ TOOLS_MAY_INCLUDE = {
     "bench": {".", "arguments", "output"},
     "commands": {".", "arguments", "output"},
     "commands/head": {".", "arguments", "commands", "output"},
+    "commands/prediction": {".", "arguments", "commands", "output"},
 }
 
 # What the tools compile in of sdk/src and sdk/app: there is one way to write a file that appears whole, and one to draw
@@ -123,7 +131,6 @@ FOREIGN = {
 
 # Units under 60 lines that one other unit uses, each with its reason to be one.
 DEFENDED = {
-    "api/model_options": "every config whose system has networks reads it",
     "densepose/rotated_input": "geometry with a test of its own",
     "head/fit/adam": "an algorithm of the literature, with a test of its own",
     "head/fit/pose_rays": "geometry with a test of its own, against finite differences",

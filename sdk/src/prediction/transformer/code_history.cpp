@@ -13,13 +13,13 @@ void FrameHistory<Value>::add(const Value* values, int64_t time_ns) {
 }
 
 template <class Value>
-void FrameHistory<Value>::select(int64_t coming_ns, size_t wanted, const Value** frames) const {
+void FrameHistory<Value>::select(int64_t target_ns, size_t wanted, const Value** frames) const {
   std::fill_n(frames, wanted, nullptr);
   if (size_ == 0 || wanted == 0) return;
   frames[wanted - 1] = at(0).values;
-  // Times of one stream are within seconds of each other, and may be anywhere; so are doubles of their differences.
+  // Times of a stream may have any value but are close together, so doubles hold their differences exactly enough.
   const auto before_newest = [&](size_t age) { return double(uint64_t(newest_ns()) - uint64_t(at(age).time_ns)); };
-  const double step = double(uint64_t(coming_ns) - uint64_t(newest_ns()));
+  const double step = double(uint64_t(target_ns) - uint64_t(newest_ns()));
   size_t age = 0;
   for (size_t k = 1; k < wanted; ++k) {
     const double due = double(k) * step;

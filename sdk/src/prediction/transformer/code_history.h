@@ -1,4 +1,4 @@
-// What the latest frames of a stream were, by their times: their codes, or small pictures.
+// Keeps the latest frames of a stream with their times: codes, or small images.
 #pragma once
 
 #include <array>
@@ -8,13 +8,13 @@
 
 namespace maq {
 
-// Of uint16_t or uint8_t.
+// `Value`: uint16_t or uint8_t.
 template <class Value>
 class FrameHistory {
  public:
   static constexpr size_t kKept = 16;
 
-  // `count`: values of a frame.
+  // `count`: values per frame.
   explicit FrameHistory(size_t count) : count_(count), values_(kKept * count) {}
 
   void add(const Value* values, int64_t time_ns);
@@ -22,17 +22,16 @@ class FrameHistory {
 
   size_t size() const { return size_; }
   int64_t newest_ns() const { return at(0).time_ns; }
-  // Values of the newest frame, and of those that are as far apart in time as the newest is from `coming_ns`, each
-  // within half of that: frames may be missing, and need not be evenly spaced. `frames`: `wanted` of them, the oldest
-  // first; null from the first one on, going back, that is not there.
-  void select(int64_t coming_ns, size_t wanted, const Value** frames) const;
+  // Selects `wanted` frames into `frames`, the oldest first. Their spacing is the time from the newest frame to
+  // `target_ns`; each may be off by half of that, so that frames may be missing. Null from the first missing one back.
+  void select(int64_t target_ns, size_t wanted, const Value** frames) const;
 
  private:
   struct Known {
     const Value* values;
     int64_t time_ns;
   };
-  // The newest is 0.
+  // `age`: 0 is the newest.
   Known at(size_t age) const {
     const size_t slot = (next_ + kKept - 1 - age) % kKept;
     return {values_.data() + slot * count_, times_ns_[slot]};
@@ -45,6 +44,6 @@ class FrameHistory {
 };
 
 using CodeHistory = FrameHistory<uint16_t>;
-using PictureHistory = FrameHistory<uint8_t>;
+using ImageHistory = FrameHistory<uint8_t>;
 
 }  // namespace maq

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "core/simd_clones.h"
-#include "prediction/codes/code_file.h"
+#include "prediction/codec/code_file.h"
 
 namespace maq {
 namespace {

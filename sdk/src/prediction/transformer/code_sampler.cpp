@@ -27,16 +27,16 @@ CodeSampler::CodeSampler(const SamplingSettings& settings, size_t entries)
   }
 }
 
-uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
+uint16_t CodeSampler::sample(const float* logits, const SamplePosition& position) {
   const size_t entries = weights_.size();
   const float largest = largest_logit(logits, entries), temperature = settings_.temperature;
   if (std::isnan(largest)) {
-    throw Error(MAQ_ERROR_INFERENCE, "The transformer gave NaN. Install the bundle again.");
+    throw Error(MAQ_ERROR_INFERENCE, "The transformer returned NaN. Install the bundle again.");
   }
   const auto likeliest = uint16_t(std::find(logits, logits + entries, largest) - logits);  // the first of equals
   if (temperature == 0 || settings_.top_k == 1) return likeliest;
 
-  if (std::isinf(largest)) {  // of +infinite ones each; where all are -infinite, each of all
+  if (std::isinf(largest)) {  // uniform over the +infinite ones, or over all if all are -infinite
     std::transform(logits, logits + entries, weights_.begin(), [&](float l) { return l == largest ? kUnit : 0.0f; });
   } else if (std::isinf(temperature)) {
     std::transform(logits, logits + entries, weights_.begin(), [](float l) { return l > -kUnbounded ? kUnit : 0.0f; });
@@ -63,7 +63,7 @@ uint16_t CodeSampler::draw(const float* logits, const DrawPosition& position) {
   uint64_t total = 0;
   for (const float weight : weights_) total += uint32_t(int32_t(weight));
   const std::array<uint32_t, 4> words =
-      philox({position.place, position.frame, position.stream, uint32_t(position.sample) << 16 | position.slice},
+      philox({position.cell, position.frame, position.stream, uint32_t(position.sample) << 16 | position.group},
              settings_.seed);
   // 53 of the bits, as many as a double has, below 1; the product is rounded once, whatever the processor.
   const uint64_t random = (uint64_t(words[0]) << 32 | words[1]) >> 11;

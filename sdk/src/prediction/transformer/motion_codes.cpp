@@ -7,7 +7,7 @@
 namespace maq {
 
 MotionCodes::MotionCodes(std::shared_ptr<FrameEncoder> encoder)
-    : encoder_(std::move(encoder)), predictor_({MAQ_PREDICTION_MOTION, 1}), codes_(encoder_->codes().count()) {}
+    : encoder_(std::move(encoder)), predictor_({PredictionMethod::kMotion, 1}), codes_(encoder_->codes().count()) {}
 
 void MotionCodes::reset() {
   predictor_.reset();
@@ -23,16 +23,11 @@ void MotionCodes::add(const uint8_t* rgb, int64_t time_ns) {
   frames_ = std::min<size_t>(frames_ + 1, 2);
 }
 
-const uint8_t* MotionCodes::picture(int64_t coming_ns) {
+const uint16_t* MotionCodes::at(int64_t target_ns, const uint16_t* newest) {
   if (frames_ < 2) return nullptr;
-  predictor_.predict(coming_ns - newest_ns_, moved_);
-  return moved_.storage.data();
-}
-
-const uint16_t* MotionCodes::at(int64_t coming_ns, const uint16_t* newest) {
-  if (picture(coming_ns) == nullptr) return nullptr;
-  if (predictor_.stats().method == MAQ_PREDICTION_LAST) return newest;
-  encoder_->run(moved_.image, codes_.data());
+  predictor_.predict(target_ns - newest_ns_, moved_);
+  if (predictor_.stats().method == PredictionMethod::kLast) return newest;
+  encoder_->encode(moved_.image, codes_.data());
   return codes_.data();
 }
 

@@ -1,4 +1,4 @@
-// The picture that motion alone foresees, and its codes: what networks are shown beside the frames before.
+// Codes of the frame that motion alone predicts: an input of the transformer beside the past frames.
 #pragma once
 
 #include <cstdint>
@@ -6,30 +6,28 @@
 #include <vector>
 
 #include "core/frame.h"
-#include "prediction/codes/frame_encoder.h"
-#include "prediction/predictor.h"
+#include "prediction/blend/motion_predictor.h"
+#include "prediction/codec/frame_encoder.h"
 
 namespace maq {
 
-// Of one stream, in frames as the networks see them.
+// For one stream, in frames of the networks' input size.
 class MotionCodes {
  public:
   explicit MotionCodes(std::shared_ptr<FrameEncoder> encoder);
 
-  // The stream's next frame: R, G, B of [frame_px][frame_px].
+  // Adds the stream's next frame: [frame_px][frame_px][3], R, G, B.
   void add(const uint8_t* rgb, int64_t time_ns);
   void reset();
 
-  // Of what will be there at `coming_ns`, which is not before the newest frame and at most Predictor::kMaxAhead_ns
-  // after it: [places][slices], until the next call; null until two frames have shown how things move. `newest`: codes
-  // of the newest frame, which it is where nothing moves. Throws what FrameEncoder::run() throws.
-  const uint16_t* at(int64_t coming_ns, const uint16_t* newest);
-  // That picture: R, G, B of [frame_px][frame_px].
-  const uint8_t* picture(int64_t coming_ns);
+  // Returns the codes predicted for `target_ns`, [cells][groups], valid until the next call; null before the second
+  // frame. `target_ns`: 0 to FramePredictor::kMaxAhead_ns after the newest frame. Returns `newest`, the newest frame's
+  // codes, while nothing moves. Throws the exceptions of FrameEncoder::encode().
+  const uint16_t* at(int64_t target_ns, const uint16_t* newest);
 
  private:
   std::shared_ptr<FrameEncoder> encoder_;
-  Predictor predictor_;
+  MotionPredictor predictor_;
   Frame seen_, moved_;
   std::vector<uint16_t> codes_;
   int64_t newest_ns_ = 0;

@@ -1,5 +1,5 @@
 // Random numbers by counting: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3",
-// SC 2011). Each counter has numbers of its own, whatever was drawn before.
+// SC 2011). Each counter value has its own numbers, independent of earlier calls.
 #pragma once
 
 #include <array>

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "prediction/transformer/row_sums.h"
+#include "prediction/transformer/embedding_sums.h"
 
 namespace maq {
 namespace {
@@ -14,11 +14,12 @@ TransformerTables tables_of(const CodeBundle& bundle) {
   const std::string name = manifest.listed_file(node.at("file"));
   const auto found = bundle.bundle.files.find(name);
   if (found == bundle.bundle.files.end()) node.at("file").fail("is ", name, ", which holds the codes");
-  TransformerTables tables = read_row_file(found->second.data(), found->second.size(), bundle.bundle.path_of(name));
+  TransformerTables tables =
+      read_embedding_file(found->second.data(), found->second.size(), bundle.bundle.path_of(name));
   const FrameCodes& codes = *bundle.codes;
-  if (tables.slices != codes.slices || tables.entries != codes.entries || tables.side != codes.side) {
-    node.fail("is of ", tables.side, " x ", tables.side, " places of ", tables.slices, " codes of ", tables.entries,
-              ", but the bundle's are ", codes.side, " x ", codes.side, ", ", codes.slices, " and ", codes.entries);
+  if (tables.groups != codes.groups || tables.entries != codes.entries || tables.side != codes.side) {
+    node.fail("is of ", tables.side, " x ", tables.side, " cells of ", tables.groups, " codes of ", tables.entries,
+              ", but the bundle's are ", codes.side, " x ", codes.side, ", ", codes.groups, " and ", codes.entries);
   }
   return tables;
 }
@@ -58,9 +59,9 @@ void require_side(const Manifest& manifest, const std::string& graph, const char
 TensorSpec tensor(const std::string& name, std::vector<Dimension> shape) { return {name, "float32", std::move(shape)}; }
 
 // The last size of a graph's third input, the keys of its first layer; 0 where there is none.
-int64_t head_width_of(const GraphSpec& slices) {
-  if (slices.inputs.size() < 3 || slices.inputs[2].shape.size() != 4) return 0;
-  const int64_t* const width = std::get_if<int64_t>(&slices.inputs[2].shape[3]);
+int64_t head_width_of(const GraphSpec& masked) {
+  if (masked.inputs.size() < 3 || masked.inputs[2].shape.size() != 4) return 0;
+  const int64_t* const width = std::get_if<int64_t>(&masked.inputs[2].shape[3]);
   return width != nullptr && *width > 0 && *width <= 4096 ? *width : 0;
 }
 
@@ -70,18 +71,18 @@ TransformerBundle::TransformerBundle(const CodeBundle& bundle)
     : codes(bundle.codes),
       tables(tables_of(bundle)),
       context(graph_of(bundle, "context")),
-      slices(graph_of(bundle, "slices")) {
+      masked(graph_of(bundle, "slices")) {
   const Manifest& manifest = bundle.bundle.manifest;
   const auto range = manifest.root.at("transformer").at("fps").numbers<2>(0.1, 1000);
   min_fps = range[0], max_fps = range[1];
   if (max_fps < min_fps) manifest.root.at("transformer").at("fps").fail("ends before it begins");
 
-  const auto places = int64_t(tables.places()), width = int64_t(tables.width), embedding = int64_t(tables.embedding);
+  const auto cells = int64_t(tables.cells()), width = int64_t(tables.width), embedding = int64_t(tables.embedding);
   require_side(manifest, "context", "inputs", context.spec.inputs,
-               {tensor("summed", {1, places, embedding}), tensor("time_step", {1, 1})});
-  require_side(manifest, "context", "outputs", context.spec.outputs, {tensor("context", {1, places, width})});
+               {tensor("summed", {1, cells, embedding}), tensor("time_step", {1, 1})});
+  require_side(manifest, "context", "outputs", context.spec.outputs, {tensor("context", {1, cells, width})});
 
-  head_width = size_t(head_width_of(slices.spec));
+  head_width = size_t(head_width_of(masked.spec));
   const auto heads_count = int64_t(tables.heads), of_head = int64_t(head_width);
   Tensors inputs{tensor("context", {"samples", "rows", width}),
                  tensor("near", {"samples", "rows", int64_t(kNearCodes) * embedding})};
@@ -94,10 +95,10 @@ TransformerBundle::TransformerBundle(const CodeBundle& bundle)
     }
     inputs.push_back(tensor("bias_" + number, {heads_count, "rows", "kept_and_rows"}));
   }
-  require_side(manifest, "slices", "inputs", slices.spec.inputs, inputs);
-  require_side(manifest, "slices", "outputs", slices.spec.outputs, outputs);
+  require_side(manifest, "slices", "inputs", masked.spec.inputs, inputs);
+  require_side(manifest, "slices", "outputs", masked.spec.outputs, outputs);
 
-  for (size_t k = 0; k < tables.slices; ++k) {
+  for (size_t k = 0; k < tables.groups; ++k) {
     const std::string name = "head_" + std::to_string(k);
     heads.push_back(graph_of(bundle, name));
     require_side(manifest, name, "inputs", heads.back().spec.inputs,

@@ -1,4 +1,4 @@
-// The part of a bundle for prediction that has the transformer (docs/formats.md): graphs, rows, and what they are for.
+// The transformer of a prediction bundle (docs/formats.md): its graphs and tables.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,16 @@
 #include <vector>
 
 #include "nn/session.h"
-#include "prediction/codes/code_bundle.h"
-#include "prediction/transformer/row_file.h"
+#include "prediction/codec/code_bundle.h"
+#include "prediction/transformer/embedding_file.h"
 
 namespace maq {
 
 struct TransformerBundle {
-  // A graph, and its bytes for sessions that are opened later.
+  // A graph and its bytes, from which sessions are opened later.
   struct Graph {
     GraphSpec spec;
-    std::string name;  // in errors
+    std::string name;  // for error sentences
     std::vector<uint8_t> bytes;
 
     std::unique_ptr<Session> open(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime,
@@ -25,18 +25,18 @@ struct TransformerBundle {
     }
   };
 
-  // Whether a bundle has that part.
+  // Returns whether a bundle has a transformer.
   static bool is_in(const CodeBundle& bundle) { return bundle.bundle.manifest.root.find("transformer").has_value(); }
-  // Throws MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is read, or graphs, rows and codes do not belong
-  // together; what read_row_file() throws.
+  // Throws MAQ_ERROR_BAD_BUNDLE when the manifest is incomplete or graphs, tables and codes do not match; the
+  // exceptions of read_embedding_file().
   explicit TransformerBundle(const CodeBundle& bundle);
 
   std::shared_ptr<const FrameCodes> codes;
   TransformerTables tables;
-  size_t head_width = 0;           // of a key or value
-  float min_fps = 0, max_fps = 0;  // of the clips that it was trained on
-  Graph context, slices;
-  std::vector<Graph> heads;  // by slice
+  size_t head_width = 0;           // width of a key or value
+  float min_fps = 0, max_fps = 0;  // frame rates in training
+  Graph context, masked;           // "context" and "slices" of the bundle
+  std::vector<Graph> heads;        // [groups]
 };
 
 }  // namespace maq

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/log.h"
-#include "prediction/codes/frame_decoder.h"
-#include "prediction/surprise/surprise.h"
+#include "prediction/codec/frame_decoder.h"
+#include "prediction/novelty/novelty.h"
 #include "support/temp_folder.h"
 
 namespace tiny_prediction {

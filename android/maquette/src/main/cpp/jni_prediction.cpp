@@ -1,4 +1,4 @@
-// What a stream will show next, how surprising what it shows is, and live sources whose short gaps are bridged.
+// Prediction, novelty, and live sources with short gaps filled.
 #include <atomic>
 #include <chrono>
 #include <memory>
@@ -14,57 +14,34 @@ using maq_jni::sized;
 
 namespace {
 
-// How long a wait for a frame of a concealer may hold up its closing.
+// The longest time that a wait for a frame delays closing.
 constexpr int64_t kSlice_ns = 50000000;
 
-// What Java has as a concealer. The C API's has no call that ends a wait but the one that stops its source.
+// The concealer of Java. In the C API, only stopping the source ends a wait.
 struct StoppableConcealer {
   maq_concealer* concealer = nullptr;
   jobject source = nullptr;  // global: the garbage collector would stop a source that the app has forgotten
   std::atomic<bool> is_stopped{false};
 };
 
-maq_predictor_config predictor_config(const std::vector<jdouble>& from) {
-  maq_predictor_config config;
-  check(maq_predictor_config_init(&config, sizeof config));
-  config.threads = int32_t(from[0]);
-  config.frame_pool_size = maq_jni::count_of(from[2]);
-  return config;
-}
-
 }  // namespace
 
 // `values` as in Predictor.Config.
 MAQ_NATIVE_OF(NativePrediction, jlong, createPredictor)
-(JNIEnv* env, jclass, jlong context, jdoubleArray values) {
-  return call(env, [&] {
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, 3);
-    maq_predictor_config config = predictor_config(from);
-    config.method = maq_prediction_method(int32_t(from[1]));
-    maq_predictor* predictor = nullptr;
-    check(maq_predictor_create(object<maq_context>(context), &config, &predictor));
-    return handle(predictor);
-  });
-}
-
-// `values` as in Predictor.Config; where it draws, then as in Predictor.Sampling without its seed.
-MAQ_NATIVE_OF(NativePrediction, jlong, createNetworkPredictor)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values,
  jlong seed) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const bool draws = env->GetArrayLength(values) > 3;
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, draws ? 6 : 3);
-    maq_predictor_config config = predictor_config(from);
-    bundle.put_into(config);
-    config.method = MAQ_PREDICTION_NETWORK;
-    config.network_mode = draws ? MAQ_NETWORK_DRAWN : MAQ_NETWORK_MENDED;
-    if (draws) {
-      config.temperature = float(from[3]);
-      config.top_k = maq_jni::count_of(from[4]);
-      config.passes = maq_jni::count_of(from[5]);
-      config.seed = uint64_t(seed);
-    }
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 5);
+    maq_predictor_config config;
+    check(maq_predictor_config_init(&config, sizeof config));
+    bundle.put_into(config.model);
+    config.model.threads = int32_t(from[0]);
+    config.method = maq_predictor_method(int32_t(from[1]));
+    config.frame_pool_size = maq_jni::count_of(from[2]);
+    config.temperature = float(from[3]);
+    config.top_k = maq_jni::count_of(from[4]);
+    config.seed = uint64_t(seed);
     maq_predictor* predictor = nullptr;
     check(maq_predictor_create(object<maq_context>(context), &config, &predictor));
     return handle(predictor);
@@ -87,29 +64,37 @@ MAQ_NATIVE_OF(NativePrediction, jlong, predict)(JNIEnv* env, jclass, jlong predi
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, void, draw)
-(JNIEnv* env, jclass, jlong predictor, jint samples, jint frames, jdouble step_s) {
+MAQ_NATIVE_OF(NativePrediction, void, sample)
+(JNIEnv* env, jclass, jlong predictor, jint sample_count, jint frame_count, jdouble step_s) {
   call(env, [&] {
-    check(maq_predictor_draw(object<maq_predictor>(predictor), uint32_t(samples), uint32_t(frames), step_s));
+    check(
+        maq_predictor_sample(object<maq_predictor>(predictor), uint32_t(sample_count), uint32_t(frame_count), step_s));
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, jlong, drawn)(JNIEnv* env, jclass, jlong predictor, jint sample, jint number) {
+MAQ_NATIVE_OF(NativePrediction, void, cancelPredictor)(JNIEnv* env, jclass, jlong predictor) {
+  call(env, [&] { check(maq_predictor_cancel(object<maq_predictor>(predictor))); });
+}
+
+MAQ_NATIVE_OF(NativePrediction, jlong, acquireSample)
+(JNIEnv* env, jclass, jlong predictor, jint sample_index, jint frame_index) {
   return call(env, [&] {
     maq_frame* frame = nullptr;
-    check(maq_predictor_acquire_drawn(object<maq_predictor>(predictor), uint32_t(sample), uint32_t(number), &frame));
+    check(maq_predictor_acquire_sample(object<maq_predictor>(predictor), uint32_t(sample_index), uint32_t(frame_index),
+                                       &frame));
     return handle(frame);
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, jfloatArray, uncertainty)
-(JNIEnv* env, jclass, jlong predictor, jint sample, jint number) {
+MAQ_NATIVE_OF(NativePrediction, jfloatArray, entropyMap)
+(JNIEnv* env, jclass, jlong predictor, jint sample_index, jint frame_index) {
   return call(env, [&] {
-    const auto* const drawing = object<maq_predictor>(predictor);
+    const auto* const sampling = object<maq_predictor>(predictor);
     auto stats = sized<maq_predictor_stats>();
-    check(maq_predictor_get_stats(drawing, &stats));
+    check(maq_predictor_get_stats(sampling, &stats));
     std::vector<jfloat> bits(stats.cell_count > 0 ? stats.cell_count : 1);
-    check(maq_predictor_copy_uncertainty(drawing, uint32_t(sample), uint32_t(number), bits.data(), bits.size()));
+    check(maq_predictor_copy_entropy_map(sampling, uint32_t(sample_index), uint32_t(frame_index), bits.data(),
+                                         bits.size()));
     return maq_jni::floats_of(env, bits.data(), bits.size());
   });
 }
@@ -124,72 +109,73 @@ MAQ_NATIVE_OF(NativePrediction, jdoubleArray, statsOfPredictor)(JNIEnv* env, jcl
     auto s = sized<maq_predictor_stats>();
     check(maq_predictor_get_stats(object<maq_predictor>(predictor), &s));
     return maq_jni::doubles_of(
-        env, {s.grey_ms, s.flow_ms, s.choice_ms, s.push_ms, s.project_ms, s.fetch_ms, s.predict_ms, double(s.method),
-              s.motion_fraction, double(s.pushed_count), double(s.predicted_count), double(s.reset_count),
-              s.networks_ms, double(s.drawn_count), double(s.step_count), double(s.pass_count)});
+        env, {s.luma_ms, s.flow_ms, s.weights_ms, s.push_ms, s.project_ms, s.warp_ms, s.predict_ms, s.networks_ms,
+              double(s.method), s.motion_fraction, double(s.pushed_count), double(s.predicted_count),
+              double(s.reset_count), double(s.sampled_frame_count), double(s.step_count)});
   });
 }
 
-// `values` as in Surprise.Config. `networks_of` may be 0; else no bundle is read.
-MAQ_NATIVE_OF(NativePrediction, jlong, createSurprise)
+// `values` as in Novelty.Config. `shared_with` may be 0; otherwise no bundle is read.
+MAQ_NATIVE_OF(NativePrediction, jlong, createNovelty)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values,
- jlong networks_of) {
+ jlong shared_with) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
     const std::vector<jdouble> from = maq_jni::numbers(env, values, 4);
-    maq_surprise_config config;
-    check(maq_surprise_config_init(&config, sizeof config));
-    bundle.put_into(config);
-    config.threads = int32_t(from[0]);
-    config.allow_spinning = int32_t(from[1]);
+    maq_novelty_config config;
+    check(maq_novelty_config_init(&config, sizeof config));
+    bundle.put_into(config.model);
+    config.model.threads = int32_t(from[0]);
+    config.model.spinning = from[1] != 0 ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
     config.event_ratio = float(from[2]);
-    config.method = from[3] != 0 ? MAQ_SURPRISE_TABLE : MAQ_SURPRISE_AUTO;
-    config.networks_of = object<maq_surprise>(networks_of);
-    maq_surprise* surprise = nullptr;
-    check(maq_surprise_create(object<maq_context>(context), &config, &surprise));
-    return handle(surprise);
+    config.method = maq_novelty_method(int32_t(from[3]));
+    config.shared_with = object<maq_novelty>(shared_with);
+    maq_novelty* novelty = nullptr;
+    check(maq_novelty_create(object<maq_context>(context), &config, &novelty));
+    return handle(novelty);
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, void, destroySurprise)(JNIEnv*, jclass, jlong surprise) {
-  maq_surprise_destroy(object<maq_surprise>(surprise));
+MAQ_NATIVE_OF(NativePrediction, void, destroyNovelty)(JNIEnv*, jclass, jlong novelty) {
+  maq_novelty_destroy(object<maq_novelty>(novelty));
 }
 
-// Columns, rows, bits and ratio, whether it is an event, a cut and a start; then the map.
-MAQ_NATIVE_OF(NativePrediction, jfloatArray, pushToSurprise)(JNIEnv* env, jclass, jlong surprise, jlong frame) {
+// Returns columns, rows, bits, ratio, is event, is cut, is stream start; then the map.
+MAQ_NATIVE_OF(NativePrediction, jfloatArray, pushToNovelty)(JNIEnv* env, jclass, jlong novelty, jlong frame) {
   return call(env, [&] {
-    auto* const stream = object<maq_surprise>(surprise);
-    auto score = sized<maq_surprise_score>();
-    check(maq_surprise_push(stream, object<maq_frame>(frame), &score));
-    std::vector<jfloat> values = {float(score.columns),  float(score.rows),   score.bits,           score.ratio,
-                                  float(score.is_event), float(score.is_cut), float(score.is_start)};
+    auto* const stream = object<maq_novelty>(novelty);
+    auto score = sized<maq_novelty_score>();
+    check(maq_novelty_push(stream, object<maq_frame>(frame), &score));
+    std::vector<jfloat> values = {
+        float(score.columns), float(score.rows),           score.bits, score.ratio, float(score.is_event),
+        float(score.is_cut),  float(score.is_stream_start)};
     const size_t scalars = values.size(), cells = size_t(score.columns) * size_t(score.rows);
     values.resize(scalars + cells);
-    check(maq_surprise_copy_map(stream, &values[scalars], cells));
+    check(maq_novelty_copy_map(stream, &values[scalars], cells));
     return maq_jni::floats_of(env, values.data(), values.size());
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, jlong, rebuilt)(JNIEnv* env, jclass, jlong surprise) {
+MAQ_NATIVE_OF(NativePrediction, jlong, reconstruction)(JNIEnv* env, jclass, jlong novelty) {
   return call(env, [&] {
     maq_frame* frame = nullptr;
-    check(maq_surprise_acquire_rebuilt(object<maq_surprise>(surprise), &frame));
+    check(maq_novelty_acquire_reconstruction(object<maq_novelty>(novelty), &frame));
     return handle(frame);
   });
 }
 
-MAQ_NATIVE_OF(NativePrediction, void, resetSurprise)(JNIEnv* env, jclass, jlong surprise) {
-  call(env, [&] { check(maq_surprise_reset(object<maq_surprise>(surprise))); });
+MAQ_NATIVE_OF(NativePrediction, void, resetNovelty)(JNIEnv* env, jclass, jlong novelty) {
+  call(env, [&] { check(maq_novelty_reset(object<maq_novelty>(novelty))); });
 }
 
-// In the order of maq_surprise_stats.
-MAQ_NATIVE_OF(NativePrediction, jdoubleArray, statsOfSurprise)(JNIEnv* env, jclass, jlong surprise) {
+// In the order of maq_novelty_stats.
+MAQ_NATIVE_OF(NativePrediction, jdoubleArray, statsOfNovelty)(JNIEnv* env, jclass, jlong novelty) {
   return call(env, [&] {
-    auto s = sized<maq_surprise_stats>();
-    check(maq_surprise_get_stats(object<maq_surprise>(surprise), &s));
-    return maq_jni::doubles_of(
-        env, {s.resize_ms, s.network_ms, s.nearest_ms, s.push_ms, double(s.threads), double(s.pushed_count),
-              double(s.event_count), double(s.start_count), s.transformer_ms});
+    auto s = sized<maq_novelty_stats>();
+    check(maq_novelty_get_stats(object<maq_novelty>(novelty), &s));
+    return maq_jni::doubles_of(env,
+                               {s.resize_ms, s.network_ms, s.nearest_ms, s.transformer_ms, s.push_ms, double(s.threads),
+                                double(s.pushed_count), double(s.event_count), double(s.stream_start_count)});
   });
 }
 
@@ -202,7 +188,7 @@ MAQ_NATIVE_OF(NativePrediction, jlong, createConcealer)
     check(maq_concealer_config_init(&config, sizeof config));
     config.max_gap_ms = int32_t(from[0]);
     config.threads = int32_t(from[1]);
-    config.method = maq_prediction_method(int32_t(from[2]));
+    config.method = maq_predictor_method(int32_t(from[2]));
     config.frame_pool_size = maq_jni::count_of(from[3]);
     auto made = std::make_unique<StoppableConcealer>();
     check(maq_concealer_create(object<maq_context>(context), maq_jni::Listened<maq_source>::of(source), &config,
@@ -223,7 +209,7 @@ MAQ_NATIVE_OF(NativePrediction, void, stopConcealer)(JNIEnv*, jclass, jlong conc
   object<StoppableConcealer>(concealer)->is_stopped = true;
 }
 
-// 0 after the source's last frame, and after a stop of the source or of this.
+// Returns 0 after the source's last frame, and after a stop of the source or of this.
 MAQ_NATIVE_OF(NativePrediction, jlong, acquireFromConcealer)(JNIEnv* env, jclass, jlong concealer, jlong timeout_ns) {
   return call(env, [&]() -> jlong {
     using Clock = std::chrono::steady_clock;

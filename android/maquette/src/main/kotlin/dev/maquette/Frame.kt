@@ -61,7 +61,7 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
     val sequence: Long get() = description[5]
 
     /**
-     * Where the picture of a predicted frame comes from.
+     * The captured frame that a predicted frame was made from.
      *
      * @property horizonNs from the captured frame that it was made from to its own timestamp.
      * @property ageNs since that frame was captured: until now with [Clock.MONOTONIC], else as [horizonNs].
@@ -76,7 +76,7 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
     )
 
     /**
-     * Null where a camera took the frame, or it was read, wrapped or drawn. Else it is made up, by a [Predictor] or a
+     * Null where a camera took the frame, or it was read, wrapped or drawn. Otherwise it was predicted, by a [Predictor] or a
      * [Concealer]: what acts on frames, such as a robot, must not act on it. A copy by [resize] keeps it; a bitmap or
      * pixels do not say so.
      */

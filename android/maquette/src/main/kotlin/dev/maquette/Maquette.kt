@@ -205,7 +205,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      * @param source where the frames will come from: its rate and intrinsics are recorded too.
      * @param jpegQuality 1 to 100: pixels are compressed as JPEG of that quality, for which Android 11 is needed; 0:
      *   they stay as they are, 14 MB a second at 640 x 480 (NV12) and 30 frames a second.
-     * @param keepPredicted true: frames that a [Predictor] or a [Concealer] made up are recorded too, marked as such;
+     * @param keepPredicted true: predicted frames of a [Predictor] or a [Concealer] are recorded too, marked as such;
      *   false: they are refused.
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] and [Status.UNWRITABLE].
      */
@@ -217,57 +217,53 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     ): Recorder = handle.use { context -> Recorder(context, path, source, jpegQuality, keepPredicted) }
 
     /**
-     * A predictor for one stream; no networks are needed. Does not block.
+     * Creates a predictor for one stream, without networks. Does not block.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
      */
-    fun predictor(config: Predictor.Config = Predictor.Config()): Predictor =
-        handle.use { context -> Predictor(NativePrediction.createPredictor(context, config.values())) }
+    fun predictor(config: Predictor.Config = Predictor.Config()): Predictor = predictor(config, null)
 
     /**
-     * A predictor by networks, which it loads; takes some 10 ms, so not on the main thread.
+     * Creates a predictor with the networks of [bundle]: [Predictor.Method.REFINED] or [Predictor.Method.SAMPLED]. Takes
+     * some 10 ms, so not on the main thread.
      *
-     * @param sampling how it draws samples of what may come ([Predictor.draw]); what it predicts is drawn then, too.
-     *   Null: it predicts what [Predictor.Method.AUTO] has, mended by a network, which is nearer to what comes.
-     * @param config its method is not read.
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
      *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task, or without that network).
      */
     fun predictor(
         bundle: ModelBundle,
-        sampling: Predictor.Sampling? = Predictor.Sampling(),
-        config: Predictor.Config = Predictor.Config(),
-    ): Predictor =
+        config: Predictor.Config = Predictor.Config(method = Predictor.Method.REFINED),
+    ): Predictor = predictor(config, bundle)
+
+    private fun predictor(config: Predictor.Config, bundle: ModelBundle?): Predictor =
         handle.use { context ->
-            val values = config.values() + (sampling?.values() ?: doubleArrayOf())
-            val (folder, names, buffers) = Triple(bundle.folder, bundle.names, bundle.buffers)
+            val (folder, names, buffers) = Triple(bundle?.folder, bundle?.names, bundle?.buffers)
             Predictor(
-                NativePrediction.createNetworkPredictor(context, folder, names, buffers, values, sampling?.seed ?: 0),
+                NativePrediction.createPredictor(context, folder, names, buffers, config.values(), config.seed),
             )
         }
 
     /**
-     * How surprising the frames of one stream are. Loads the networks of prediction; takes some 10 ms, so not on the
-     * main thread.
+     * Creates a novelty stream with the networks of [bundle]. Takes some 10 ms, so not on the main thread.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
      *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task).
      */
-    fun surprise(bundle: ModelBundle, config: Surprise.Config = Surprise.Config()): Surprise =
-        handle.use { context -> Surprise(context, bundle, config, null) }
+    fun novelty(bundle: ModelBundle, config: Novelty.Config = Novelty.Config()): Novelty =
+        handle.use { context -> Novelty(context, bundle, config, null) }
 
     /**
-     * As above, for a further stream, with the networks of another one, which may be closed: it takes some kilobytes
-     * then, and frames of both are encoded one after the other. Does not block.
+     * Creates a further stream that shares the networks of [sharedWith], which may be closed. It takes a few kilobytes;
+     * both encode frames in turn. Does not block.
      *
-     * @param eventRatio as of [Surprise.Config].
+     * @param eventRatio as in [Novelty.Config].
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
      */
-    fun surprise(networksOf: Surprise, eventRatio: Float = 4f): Surprise =
-        handle.use { context -> Surprise(context, null, Surprise.Config(eventRatio = eventRatio), networksOf) }
+    fun novelty(sharedWith: Novelty, eventRatio: Float = 4f): Novelty =
+        handle.use { context -> Novelty(context, null, Novelty.Config(eventRatio = eventRatio), sharedWith) }
 
     /**
-     * A concealer of a live source, whose frames it takes until it is closed: [Source.acquireFrame] then fails with
+     * Creates a concealer of a live source. Until it is closed it takes the frames, and [Source.acquireFrame] fails with
      * [Status.BUSY]. Does not block.
      *
      * @param source stays the app's; closing or stopping it ends the frames of the concealer too.

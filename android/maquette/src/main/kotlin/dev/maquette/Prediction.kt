@@ -3,108 +3,109 @@ package dev.maquette
 import dev.maquette.jni.NativePrediction
 
 /**
- * Gets the frames of a stream as they come, and makes pictures of what it will show a while later: to hide the time
- * that a picture takes from the camera to the screen. Made by [Maquette.predictor].
+ * Takes the frames of a stream and predicts later ones, to hide the delay between camera and screen. Made by
+ * [Maquette.predictor].
  *
  * ```
  * predictor.push(frame)
- * predictor.predict(aheadS = 0.1).use { coming -> show(coming) }
+ * predictor.predict(aheadS = 0.1).use { later -> show(later) }
  * ```
  *
- * It sees pictures, not the world: never steer anything by what it made up. [Frame.origin] tells its frames from a
- * camera's. Functions may be called from any thread, one at a time; what comes while another runs throws
- * [MaquetteException] with [Status.INVALID_ARGUMENT].
+ * Predicted frames are guesses: never steer anything by them. [Frame.origin] tells them from captured ones. Functions
+ * may be called from any thread, one at a time: a call during another one throws [MaquetteException] with
+ * [Status.INVALID_ARGUMENT]. [cancel] may be called at any time.
  */
 class Predictor internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, NativePrediction::destroyPredictor)
 
-    /** How the coming picture is made. */
+    /** How frames are predicted. */
     enum class Method {
         /**
-         * The others mixed, place by place, by how right each was there about the frames that have come, at that time
-         * ahead; the last frame until that is known, and while nothing moves.
+         * Blends the last frame and the motion prediction per cell, weighted by their errors on past frames at the same
+         * horizon. Equals the last frame while these errors are unknown and while nothing moves.
          */
         AUTO,
 
-        /** The last frame, repeated. */
+        /** Repeats the last frame. */
         LAST,
 
-        /** Everything moves on as it moved between the last two frames. */
+        /** Moves everything on at the speed between the last two frames. */
         MOTION,
+
+        /** Refines [AUTO] by a network. Needs a bundle; not for a [Concealer]. */
+        REFINED,
+
+        /** Samples one possible future by a transformer. Slow. Needs a bundle; not for a [Concealer]. */
+        SAMPLED,
     }
 
     /**
      * @property threads 0: the large cores, at most 4; else 1 to 64.
-     * @property framePoolSize predicted frames that the app may hold at once, 1 to 64.
+     * @property method [Method.REFINED] and [Method.SAMPLED] need a bundle.
+     * @property framePoolSize predicted frames that the app may hold at once, 1 to 64; 0: 4.
+     * @property temperature of [Method.SAMPLED]: 0 takes the likeliest code; 1 samples by the probabilities.
+     * @property topK of [Method.SAMPLED]: samples only from this many likeliest codes; 0: from all.
+     * @property seed of [Method.SAMPLED]: equal seeds give equal frames on one processor.
      */
     data class Config(
         val threads: Int = 0,
         val method: Method = Method.AUTO,
         val framePoolSize: Int = 4,
-    ) {
-        internal fun values() =
-            doubleArrayOf(threads.toDouble(), method.ordinal.toDouble(), framePoolSize.toDouble())
-    }
-
-    /**
-     * How samples of coming frames are drawn, by a predictor that was made with networks.
-     *
-     * @property temperature 1 draws by the probabilities, 0 takes the likeliest.
-     * @property topK only so many of the likeliest of each code; 0: all.
-     * @property seed equal seeds draw the same.
-     * @property passes 0: exactly by the probabilities; 1 to 16: all places of a frame at once, at most so many times.
-     */
-    data class Sampling(
-        val temperature: Float = 1f,
+        val temperature: Float = 0f,
         val topK: Int = 0,
         val seed: Long = 0,
-        val passes: Int = 0,
     ) {
-        internal fun values() = doubleArrayOf(temperature.toDouble(), topK.toDouble(), passes.toDouble())
+        internal fun values() =
+            doubleArrayOf(
+                threads.toDouble(),
+                method.ordinal.toDouble(),
+                framePoolSize.toDouble(),
+                temperature.toDouble(),
+                topK.toDouble(),
+            )
     }
 
     /**
-     * Wall-clock milliseconds of the latest push and prediction, and counts since the predictor was made.
+     * Wall-clock milliseconds of the latest calls, and counts since the predictor was created.
      *
-     * @property greyMs of the push: the frame copied, and its brightness at several sizes.
-     * @property flowMs its motion since the frame before.
-     * @property choiceMs which method was right about it ([Method.AUTO]).
-     * @property pushMs all of it.
-     * @property projectMs of the prediction: where each pixel comes from.
-     * @property fetchMs its pixels.
-     * @property predictMs all of it.
-     * @property method of the latest prediction: [Method.LAST] or [Method.MOTION] where one made all of it.
-     * @property motionFraction how much of it is motion's, 0 to 1.
-     * @property resetCount frames that did not go on from the one before, so that it was forgotten.
-     * @property networksMs of networks at the latest push, prediction or [draw]; 0 where nothing moved.
-     * @property drawnCount frames drawn for the latest prediction or [draw].
-     * @property stepCount of that: steps from code to code, each of all samples, 256 a frame; 0 where nothing moved.
-     * @property passCount of that: passes over all codes of a frame at once, with [Sampling.passes].
+     * @property lumaMs of the push: the luma pyramid of the frame.
+     * @property flowMs of the push: optical flow from the frame before.
+     * @property weightsMs of the push: blend weights ([Method.AUTO], [Method.REFINED], [Method.SAMPLED]).
+     * @property pushMs of the push: total without networks.
+     * @property projectMs of the prediction: the flow projected to the later time.
+     * @property warpMs of the prediction: pixels warped along the flow.
+     * @property predictMs of the prediction: total without networks.
+     * @property networksMs of the latest push, prediction or [sample]; 0: none ran, as nothing moved.
+     * @property method the method that made the latest prediction; [Method.LAST] or [Method.MOTION] if one of these made
+     *   the whole frame of [Method.AUTO].
+     * @property motionFraction the share of the motion prediction, 0 to 1, before networks changed it.
+     * @property resetCount times that a frame did not continue the stream.
+     * @property sampledFrameCount frames of all samples in the latest prediction or [sample].
+     * @property stepCount decoding steps for these frames: one per cell, for all samples at once.
      */
     data class Stats(
-        val greyMs: Double,
+        val lumaMs: Double,
         val flowMs: Double,
-        val choiceMs: Double,
+        val weightsMs: Double,
         val pushMs: Double,
         val projectMs: Double,
-        val fetchMs: Double,
+        val warpMs: Double,
         val predictMs: Double,
+        val networksMs: Double,
         val method: Method,
         val motionFraction: Double,
         val pushedCount: Long,
         val predictedCount: Long,
         val resetCount: Long,
-        val networksMs: Double,
-        val drawnCount: Int,
+        val sampledFrameCount: Int,
         val stepCount: Int,
-        val passCount: Int,
     )
 
     /**
-     * Shows it the stream's next frame, which is copied, and may be closed. Time counts by the frames' timestamps, so
-     * that frames may be missing. The frames before are forgotten where this one is of another size, format or clock,
-     * not later than they are or more than a second later, or after a cut; one of the same time as the frame before
-     * replaces it. Takes milliseconds, so not on the main thread.
+     * Adds the stream's next frame. The frame is copied and may be closed. Motion is computed from timestamps, so frames
+     * may be missing. Earlier frames are forgotten when this one has another size, format or clock, is not later, is
+     * more than a second later, or shows another scene. A frame with the newest frame's timestamp replaces it. Takes
+     * milliseconds, so not on the main thread.
      *
      * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image).
      */
@@ -112,81 +113,85 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
         handle.use { predictor -> frame.handle.use { NativePrediction.pushToPredictor(predictor, it) } }
 
     /**
-     * The picture that the stream will show [aheadS] seconds, 0 to 10, after the latest frame: of that frame's size and
-     * format, with that time as its timestamp and that frame's sequence. It comes from a pool: close it soon. Takes
-     * milliseconds, so not on the main thread.
+     * Predicts the frame [aheadS] seconds, 0 to 10, after the newest one, in the same size and format. Its timestamp is
+     * that time; its sequence is the newest frame's. It comes from a pool: close it soon. Takes milliseconds, so not on
+     * the main thread.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame) and [Status.POOL_EMPTY]
-     *   while [Config.framePoolSize] frames are open.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame), [Status.POOL_EMPTY] while
+     *   [Config.framePoolSize] frames are open, and [Status.CANCELLED].
      */
     fun predict(aheadS: Double): Frame = Frame(handle.use { NativePrediction.predict(it, aheadS) })
 
     /**
-     * Draws [samples], 1 to 16, of what the stream may show, each [frames], 1 to 64, that are [stepS], to 0.125, apart.
-     * A sample is the same however many others are drawn. While nothing moves all are the last frame. [drawn] and
-     * [uncertainty] give them until the next push, prediction or draw. Takes long, so not on the main thread.
+     * Samples [sampleCount], 1 to 16, possible futures of [frameCount], 1 to 64, frames that are [stepS], up to 0.125,
+     * seconds apart. Results depend only on the seed and the pushed frames, not on the counts. All samples equal the
+     * last frame while nothing moves. They are valid until the next push, prediction or sampling. Takes long, so not on
+     * the main thread.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame) and [Status.UNSUPPORTED]
-     *   (a predictor without networks).
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame), [Status.UNSUPPORTED] (the
+     *   method is not [Method.SAMPLED]) and [Status.CANCELLED].
      */
-    fun draw(samples: Int, frames: Int, stepS: Double) =
-        handle.use { NativePrediction.draw(it, samples, frames, stepS) }
+    fun sample(sampleCount: Int, frameCount: Int, stepS: Double) =
+        handle.use { NativePrediction.sample(it, sampleCount, frameCount, stepS) }
+
+    /** Cancels the sampling that runs, or else the next one: it throws [Status.CANCELLED]. Any thread. */
+    fun cancel() = handle.use(NativePrediction::cancelPredictor)
 
     /**
-     * The picture of frame [number], from 1, of a sample, from 0; all else as of [predict].
+     * Decodes frame [frameIndex] (1-based) of sample [sampleIndex] (0-based). Otherwise like [predict].
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for one that was not drawn, and [Status.POOL_EMPTY].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a frame that was not sampled, and [Status.POOL_EMPTY].
      */
-    fun drawn(sample: Int, number: Int): Frame = Frame(handle.use { NativePrediction.drawn(it, sample, number) })
+    fun acquireSample(sampleIndex: Int, frameIndex: Int): Frame =
+        Frame(handle.use { NativePrediction.acquireSample(it, sampleIndex, frameIndex) })
 
     /**
-     * How uncertain that frame was when it was drawn: the entropy of a code in bits, of 16 x 16 cells row by row.
+     * Returns the mean entropy of a code of that frame in bits, for 16 x 16 cells row by row.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for one that was not drawn.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a frame that was not sampled.
      */
-    fun uncertainty(sample: Int, number: Int): FloatArray =
-        handle.use { NativePrediction.uncertainty(it, sample, number) }
+    fun entropyMap(sampleIndex: Int, frameIndex: Int): FloatArray =
+        handle.use { NativePrediction.entropyMap(it, sampleIndex, frameIndex) }
 
-    /** Forgets the frames so far, as before another stream. */
+    /** Forgets the frames so far, to begin another stream. */
     fun reset() = handle.use(NativePrediction::resetPredictor)
 
-    /** As it is now. */
+    /** Times and counts at this moment. */
     val stats: Stats
         get() {
             val s = handle.use(NativePrediction::statsOfPredictor)
             return Stats(
-                s[0], s[1], s[2], s[3], s[4], s[5], s[6], Method.entries[s[7].toInt()], s[8], s[9].toLong(),
-                s[10].toLong(), s[11].toLong(), s[12], s[13].toInt(), s[14].toInt(), s[15].toInt(),
+                s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], Method.entries[s[8].toInt()], s[9], s[10].toLong(),
+                s[11].toLong(), s[12].toLong(), s[13].toInt(), s[14].toInt(),
             )
         }
 
-    /** Frames that it made stay valid. */
+    /** Its frames stay valid. */
     override fun close() = handle.close()
 }
 
 /**
- * How surprising each frame of a stream is after the one before, and where, in bits: to notice what stands out, such as
- * a cut, a frozen or a covered camera, or something that appears, without a list of what may happen. Made by
- * [Maquette.surprise].
+ * Scores how unexpected each frame of a stream is after the frames before, and where, in bits. Finds cuts, frozen or
+ * covered cameras, and objects that appear, without a list of events. Made by [Maquette.novelty].
  *
  * ```
- * val score = surprise.push(frame)
+ * val score = novelty.push(frame)
  * if (score.isEvent) show(score.ratio)
  * ```
  *
  * Functions may be called from any thread, one at a time, as of a [Predictor].
  */
-class Surprise internal constructor(
+class Novelty internal constructor(
     context: Long,
     bundle: ModelBundle?,
     config: Config,
-    networksOf: Surprise?,
+    sharedWith: Novelty?,
 ) : AutoCloseable {
     private val handle: Handle
 
     init {
         fun create(other: Long) =
-            NativePrediction.createSurprise(
+            NativePrediction.createNovelty(
                 context,
                 bundle?.folder,
                 bundle?.names,
@@ -194,113 +199,122 @@ class Surprise internal constructor(
                 config.values(),
                 other,
             )
-        val made = if (networksOf == null) create(0) else networksOf.handle.use(::create)
-        handle = Handle(this, made, NativePrediction::destroySurprise)
+        val made = if (sharedWith == null) create(0) else sharedWith.handle.use(::create)
+        handle = Handle(this, made, NativePrediction::destroyNovelty)
+    }
+
+    /** The source of code probabilities. */
+    enum class Method {
+        /** The bundle's transformer, which sees three past frames; without one, the bigram prior. */
+        AUTO,
+
+        /** The bigram prior: how often a code followed another in training. Takes about 0 ms. */
+        BIGRAM,
     }
 
     /**
-     * @property threads as of [DensePose.Config].
-     * @property allowSpinning as of [DensePose.Config].
-     * @property eventRatio a frame is an event from this ratio on, and from 1 / it down; above 1, at most 1e6.
-     * @property usesTable a table says how likely codes are, which takes next to no time, also where the bundle has a
-     *   transformer, which sees three frames before.
+     * @property threads as in [DensePose.Config].
+     * @property allowSpinning as in [DensePose.Config].
+     * @property eventRatio a frame is an event from this ratio up, and from 1 / eventRatio down; above 1, at most 1e6;
+     *   0: 4.
      */
     data class Config(
         val threads: Int = 0,
         val allowSpinning: Boolean = false,
         val eventRatio: Float = 4f,
-        val usesTable: Boolean = false,
+        val method: Method = Method.AUTO,
     ) {
         internal fun values() =
             doubleArrayOf(
                 threads.toDouble(),
                 if (allowSpinning) 1.0 else 0.0,
                 eventRatio.toDouble(),
-                if (usesTable) 1.0 else 0.0,
+                method.ordinal.toDouble(),
             )
     }
 
     /**
-     * Of one frame.
+     * The score of one frame.
      *
-     * @property bits a code, mean of the frame: some hundredths where nothing changes, 1 to 3 where much moves, over 8
-     *   where nothing was foreseen.
-     * @property ratio bits by the median of the 8 frames before: 1 is as usual, 6 six times as surprising, 1/6 a sixth,
-     *   as of a stream that freezes. 1 while fewer than 4 are known.
-     * @property isEvent it is a cut, or the ratio is [Config.eventRatio] or more, or 1 / that or less.
-     * @property isCut nothing in it follows from the frame before, as at a cut or a black-out.
-     * @property isStart it does not go on from the frame before, and bits say how rare its codes are: the first;
-     *   another size, format or clock; an earlier time; over a second later.
+     * @property bits mean of all codes: about 0.03 when nothing changes, 1 to 3 when much moves, above 8 for a frame that
+     *   nothing predicted.
+     * @property ratio bits divided by the median of the 8 frames before: 1 is usual; 1/6 is a stream that freezes. 1
+     *   while fewer than 4 frames are known.
+     * @property isEvent a cut, or the ratio reached [Config.eventRatio] or 1 / that.
+     * @property isCut scene cut: the previous frame does not make this one more likely.
+     * @property isStreamStart the frame continues no stream: the first one, another size, format or clock, an earlier
+     *   time, or more than a second later. The bits then count how rare its codes are.
      * @property columns of the map.
      * @property rows of the map.
-     * @property map bits of a code, mean of the cell, [rows] rows of [columns] values from the top left. A cell is that
-     *   part of the frame, whatever the frame's shape.
+     * @property map mean bits of a code per cell, [rows] rows of [columns] values from the top left. The cells divide a
+     *   frame of any shape evenly.
      */
     class Score internal constructor(
         val bits: Float,
         val ratio: Float,
         val isEvent: Boolean,
         val isCut: Boolean,
-        val isStart: Boolean,
+        val isStreamStart: Boolean,
         val columns: Int,
         val rows: Int,
         val map: FloatArray,
     )
 
     /**
-     * Wall-clock milliseconds of the latest frame, and counts since it was made.
+     * Wall-clock milliseconds of the latest frame, and counts since the stream was created.
      *
-     * @property resizeMs the frame to the network's square.
-     * @property nearestMs codes of what the network says.
-     * @property pushMs all of it, and the bits.
-     * @property threads of the network.
-     * @property transformerMs how likely its codes are; 0 where the table said that.
+     * @property resizeMs the frame resized to the encoder's input.
+     * @property networkMs the encoder.
+     * @property nearestMs the nearest codebook entries of its features.
+     * @property transformerMs the transformer; 0 with the bigram prior.
+     * @property pushMs total.
+     * @property threads of the networks.
      */
     data class Stats(
         val resizeMs: Double,
         val networkMs: Double,
         val nearestMs: Double,
+        val transformerMs: Double,
         val pushMs: Double,
         val threads: Int,
         val pushedCount: Long,
         val eventCount: Long,
-        val startCount: Long,
-        val transformerMs: Double,
+        val streamStartCount: Long,
     )
 
     /**
-     * Shows it the stream's next frame, of any size and format but depth, which is not kept. Takes milliseconds, so not
-     * on the main thread. After an error the stream is as it was before the frame.
+     * Scores the stream's next frame, of any size and format except depth. The frame is not kept. Takes milliseconds, so
+     * not on the main thread. An error leaves the stream as it was before the frame.
      *
      * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image) and [Status.INFERENCE].
      */
     fun push(frame: Frame): Score {
-        val s = handle.use { surprise -> frame.handle.use { NativePrediction.pushToSurprise(surprise, it) } }
+        val s = handle.use { novelty -> frame.handle.use { NativePrediction.pushToNovelty(novelty, it) } }
         val map = s.copyOfRange(SCALARS, s.size)
         return Score(s[2], s[3], s[4] != 0f, s[5] != 0f, s[6] != 0f, s[0].toInt(), s[1].toInt(), map)
     }
 
     /**
-     * What the network saw of the latest frame: what is not in it cannot be surprising. A small square in RGB, whatever
-     * the frame's shape, with the frame's time; its [Frame.origin] has a horizon of 0. From a pool of 4: close it soon.
-     * The first call takes longer.
+     * Decodes the codes of the latest frame to a small square RGB image: the detail that the network kept. The time is
+     * the frame's; [Frame.origin] has a horizon of 0. It comes from a pool of 4: close it soon. The first call takes
+     * longer.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] before the first frame, [Status.POOL_EMPTY],
      *   [Status.BAD_BUNDLE] and [Status.INFERENCE].
      */
-    fun rebuilt(): Frame = Frame(handle.use(NativePrediction::rebuilt))
+    fun reconstruction(): Frame = Frame(handle.use(NativePrediction::reconstruction))
 
-    /** Forgets the frames so far, as before another stream. */
-    fun reset() = handle.use(NativePrediction::resetSurprise)
+    /** Forgets the frames so far, to begin another stream. */
+    fun reset() = handle.use(NativePrediction::resetNovelty)
 
-    /** As it is now. */
+    /** Times and counts at this moment. */
     val stats: Stats
         get() {
-            val s = handle.use(NativePrediction::statsOfSurprise)
-            return Stats(s[0], s[1], s[2], s[3], s[4].toInt(), s[5].toLong(), s[6].toLong(), s[7].toLong(), s[8])
+            val s = handle.use(NativePrediction::statsOfNovelty)
+            return Stats(s[0], s[1], s[2], s[3], s[4], s[5].toInt(), s[6].toLong(), s[7].toLong(), s[8].toLong())
         }
 
-    /** Pictures that it made, and streams with its networks, stay valid. */
+    /** Its images, and streams that share its networks, stay valid. */
     override fun close() = handle.close()
 
     private companion object {
@@ -309,22 +323,22 @@ class Surprise internal constructor(
 }
 
 /**
- * The frames of a live source at its rate: one that is not there when it is due is replaced by one that was predicted
- * before. Made by [Maquette.concealer].
+ * Delivers the frames of a live source at its rate. A frame that does not come in time is replaced by a predicted one.
+ * Made by [Maquette.concealer].
  *
  * ```
  * maquette.concealer(source).use { concealer ->
  *     while (true) {
  *         val frame = concealer.acquireFrame() ?: break
- *         frame.use { show(it, isMadeUp = it.origin != null) }
+ *         frame.use { show(it, isPredicted = it.origin != null) }
  *     }
  * }
  * ```
  *
- * An app that acts on what it sees, such as a robot's, must look at [Frame.origin] of every frame, or not use a
- * concealer. Gaps are bridged from the sixth frame on. When the camera has sent nothing for [Config.maxGapMs], there
- * are no more predicted frames, and calls return what the source's own would. Functions may be called from any thread,
- * but [acquireFrame] only one at a time; [frames] gives the same as a flow.
+ * An app that acts on its frames, such as a robot's, must check [Frame.origin] of every frame, or not use a concealer.
+ * Gaps are filled from the sixth frame on. After [Config.maxGapMs] without a captured frame no more are predicted, and
+ * calls return the source's own status. Functions may be called from any thread, but [acquireFrame] only one at a time;
+ * [frames] gives the same as a flow.
  */
 class Concealer internal constructor(context: Long, source: Source, config: Config) : AutoCloseable {
     private val handle =
@@ -335,10 +349,11 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
         )
 
     /**
-     * @property maxGapMs how far ahead frames are predicted, 1 to 10000.
-     * @property threads as of [Predictor.Config].
-     * @property framePoolSize frames that the app may hold at once, 1 to 64. The concealer itself holds one of the
-     *   source's ([Source.Config.framePoolSize]).
+     * @property maxGapMs the longest gap that is filled, 1 to 10000; 0: 300.
+     * @property threads as in [Predictor.Config].
+     * @property method [Predictor.Method.AUTO], [Predictor.Method.LAST] or [Predictor.Method.MOTION].
+     * @property framePoolSize frames that the app may hold at once, 1 to 64; 0: 3. The concealer itself holds one frame
+     *   of the source's pool ([Source.Config.framePoolSize]).
      */
     data class Config(
         val maxGapMs: Int = 300,
@@ -356,13 +371,15 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
     }
 
     /**
-     * @property capturedCount frames of the source that were there in time.
-     * @property predictedCount frames made up in place of others.
-     * @property lateCount frames of the source that came after a predicted one had stood for them: not delivered.
+     * Counts, and wall-clock milliseconds.
+     *
+     * @property capturedCount captured frames that came in time.
+     * @property predictedCount predicted frames.
+     * @property lateCount captured frames that came after their predicted replacement: not delivered.
      * @property droppedCount frames that the app did not acquire in time.
-     * @property latestGapMs the latest gap, as far as it was bridged.
-     * @property latestWaitMs the latest predicted frame: from when it was due until it was there.
-     * @property maxWaitMs the longest of these.
+     * @property latestGapMs length of the latest gap, up to [Config.maxGapMs].
+     * @property latestWaitMs the latest predicted frame: time from when it was due until it was ready.
+     * @property maxWaitMs the longest such time.
      */
     data class Stats(
         val capturedCount: Long,
@@ -375,9 +392,9 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
     )
 
     /**
-     * Waits for the next frame, captured or predicted; the newest, where several have come since the last call. A
-     * predicted one has the time that it stands for as its timestamp, and the sequence of the captured frame that it
-     * was made from. Timestamps grow from frame to frame.
+     * Waits for the next frame, captured or predicted; the newest one when several came since the latest call. The
+     * timestamp of a predicted frame is the time that it shows; its sequence is the newest captured frame's. Timestamps
+     * always increase.
      *
      * @param timeoutMs milliseconds; negative: without limit.
      * @return null after the source's last frame, and after [Source.stop], [Source.close] or [close], which end a call
@@ -390,7 +407,7 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
         return if (frame == 0L) null else Frame(frame)
     }
 
-    /** As it is now. */
+    /** Counts and times at this moment. */
     val stats: Stats
         get() {
             val s = handle.use(NativePrediction::statsOfConcealer)

@@ -203,7 +203,6 @@ class ConcealerTest : AndroidTest() {
                 Concealer.Config(maxGapMs = 0) to "max_gap_ms",
                 Concealer.Config(maxGapMs = 10_001) to "max_gap_ms",
                 Concealer.Config(threads = 65) to "threads",
-                Concealer.Config(framePoolSize = 0) to "frame_pool_size",
                 Concealer.Config(framePoolSize = -1) to "frame_pool_size",
             )
             for ((wrongConfig, name) in wrong) {

@@ -38,7 +38,7 @@ class PredictorTest : AndroidTest() {
     }
 
     @Test
-    fun whatMovesMovesOnAndSaysThatItIsMadeUp() =
+    fun motionGoesOnInAFrameThatIsMarkedAsPredicted() =
         withMoving { predictor ->
             val made = predictor.predict(0.2)
             made.use {
@@ -54,7 +54,7 @@ class PredictorTest : AndroidTest() {
             val stats = predictor.stats
             assertEquals(Predictor.Method.MOTION to 1.0, stats.method to stats.motionFraction)
             assertEquals(listOf(3L, 1L, 0L), with(stats) { listOf(pushedCount, predictedCount, resetCount) })
-            assertTrue("$stats", with(stats) { flowMs > 0 && pushMs >= flowMs && predictMs >= fetchMs && fetchMs > 0 })
+            assertTrue("$stats", with(stats) { flowMs > 0 && pushMs >= flowMs && predictMs >= warpMs && warpMs > 0 })
         }
 
     @Test
@@ -102,45 +102,50 @@ class PredictorTest : AndroidTest() {
         }
 
     @Test
-    fun withoutSamplingANetworkMendsWhatComes() {
+    fun aNetworkRefinesThePrediction() {
         val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
-        maquette.predictor(networks, sampling = null).use { predictor ->
+        maquette.predictor(networks).use { predictor ->
             predictor.pushTexture(0..2)
             predictor.predict(0.2).use {
                 assertEquals(200_000_000L, it.origin!!.horizonNs)
                 assertTrue(error(it, 16) < 6) // far from what stands still
             }
             assertTrue(predictor.stats.networksMs > 0)
-            assertEquals(0, predictor.stats.drawnCount)
-            failure(Status.UNSUPPORTED) { predictor.draw(1, 1, 0.1) }
+            assertEquals(0, predictor.stats.sampledFrameCount)
+            assertEquals(Predictor.Method.REFINED, predictor.stats.method)
+            failure(Status.UNSUPPORTED) { predictor.sample(1, 1, 0.1) }
         }
     }
 
     @Test
-    fun samplesAreDrawnEachByItselfAndSayWhereTheyAreUncertain() {
+    fun samplesDependOnTheSeedAloneAndHaveAnEntropyMap() {
         val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
-        val sampling = Predictor.Sampling(seed = -2)
-        maquette.predictor(networks, sampling, Predictor.Config(threads = 1)).use { predictor ->
+        val sampling =
+            Predictor.Config(threads = 1, method = Predictor.Method.SAMPLED, temperature = 1f, seed = -2)
+        maquette.predictor(networks, sampling).use { predictor ->
             predictor.pushTexture(0..2)
-            predictor.draw(3, 2, stepS = 0.1)
-            val bits = predictor.uncertainty(1, 2)
+            predictor.sample(3, 2, stepS = 0.1)
+            val bits = predictor.entropyMap(1, 2)
             assertEquals(256, bits.size)
             with(predictor.stats) {
-                assertEquals(listOf(6, 2 * 256, 0), listOf(drawnCount, stepCount, passCount))
+                assertEquals(listOf(6, 2 * 256), listOf(sampledFrameCount, stepCount))
                 assertTrue(networksMs > 0)
             }
             assertTrue("${bits.average()}", bits.average() in 0.3..9.0)
-            predictor.drawn(1, 2).use { assertEquals(200_000_000L, it.origin!!.horizonNs) }
-            predictor.draw(2, 2, stepS = 0.1)
-            assertArrayEquals(bits, predictor.uncertainty(1, 2), 0f)
-            assertTrue("of 2 samples" in failure(Status.INVALID_ARGUMENT) { predictor.drawn(2, 1) })
-            failure(Status.INVALID_ARGUMENT) { predictor.draw(-1, 1, 0.1) }
+            predictor.acquireSample(1, 2).use { assertEquals(200_000_000L, it.origin!!.horizonNs) }
+            predictor.sample(2, 2, stepS = 0.1)
+            assertArrayEquals(bits, predictor.entropyMap(1, 2), 0f)
+            assertTrue("of 2 samples" in failure(Status.INVALID_ARGUMENT) { predictor.acquireSample(2, 1) })
+            failure(Status.INVALID_ARGUMENT) { predictor.sample(-1, 1, 0.1) }
+            predictor.cancel()
+            failure(Status.CANCELLED) { predictor.sample(1, 1, stepS = 0.1) }
+            predictor.sample(1, 1, stepS = 0.1)
         }
-        for (wrong in listOf(sampling.copy(temperature = -1f), sampling.copy(topK = 513), sampling.copy(passes = 17))) {
+        for (wrong in listOf(sampling.copy(temperature = -1f), sampling.copy(topK = 513))) {
             failure(Status.INVALID_ARGUMENT) { maquette.predictor(networks, wrong) }
         }
-        withMoving { failure(Status.UNSUPPORTED) { it.draw(1, 1, 0.1) } }
-        withMoving { failure(Status.UNSUPPORTED) { it.uncertainty(0, 1) } }
+        withMoving { failure(Status.UNSUPPORTED) { it.sample(1, 1, 0.1) } }
+        withMoving { failure(Status.UNSUPPORTED) { it.entropyMap(0, 1) } }
     }
 
     @Test
@@ -168,7 +173,6 @@ class PredictorTest : AndroidTest() {
             val wrong = listOf(
                 byMotion.copy(threads = -1) to "threads",
                 byMotion.copy(threads = 65) to "threads",
-                byMotion.copy(framePoolSize = 0) to "frame_pool_size",
                 byMotion.copy(framePoolSize = -1) to "frame_pool_size",
                 byMotion.copy(framePoolSize = 65) to "frame_pool_size",
             )
@@ -196,13 +200,17 @@ class PredictorTest : AndroidTest() {
             val said = (refused.cause as NullPointerException).message!!
             assertTrue(said, "frame" in said)
             // Native methods, as if the Kotlin classes had let them pass.
-            failure(Status.INVALID_ARGUMENT) { NativePrediction.createPredictor(0, byMotion.values()) }
+            fun create(values: DoubleArray) = NativePrediction.createPredictor(0, null, null, null, values, 0)
+            failure(Status.INVALID_ARGUMENT) { create(byMotion.values()) }
             failure(Status.INVALID_ARGUMENT) { NativePrediction.pushToPredictor(0, 0) }
             failure(Status.INVALID_ARGUMENT) { NativePrediction.predict(0, 0.1) }
             failure(Status.INVALID_ARGUMENT) { NativePrediction.statsOfPredictor(0) }
-            failure(Status.INTERNAL) { NativePrediction.createPredictor(0, doubleArrayOf(1.0)) }
+            failure(Status.INTERNAL) { create(doubleArrayOf(1.0)) }
             val createPredictor = NativePrediction::class.java.methods.single { it.name == "createPredictor" }
-            val ofNull = assertThrows(InvocationTargetException::class.java) { createPredictor.invoke(null, 0L, null) }
+            val ofNull =
+                assertThrows(InvocationTargetException::class.java) {
+                    createPredictor.invoke(null, 0L, null, null, null, null, 0L)
+                }
             assertEquals(Status.INTERNAL, (ofNull.cause as MaquetteException).status)
         }
 

@@ -3,17 +3,15 @@ package dev.maquette.jni
 import dev.maquette.Source
 import java.nio.ByteBuffer
 
-/** The C API's prediction, surprise and concealing, as [Native]. */
+/** Prediction, novelty and concealment of the C API, like [Native]. */
 internal object NativePrediction {
     init {
         System.loadLibrary("maquette_jni")
     }
 
-    @JvmStatic external fun createPredictor(context: Long, values: DoubleArray): Long
-
-    /** [values] without those of a sampling: it draws nothing. */
+    /** Without [folder] and [names]: a method without networks, or the installed bundle. */
     @JvmStatic
-    external fun createNetworkPredictor(
+    external fun createPredictor(
         context: Long,
         folder: ByteArray?,
         names: Array<ByteArray>?,
@@ -25,30 +23,31 @@ internal object NativePrediction {
     @JvmStatic external fun destroyPredictor(predictor: Long)
     @JvmStatic external fun pushToPredictor(predictor: Long, frame: Long)
     @JvmStatic external fun predict(predictor: Long, aheadS: Double): Long
-    @JvmStatic external fun draw(predictor: Long, samples: Int, frames: Int, stepS: Double)
-    @JvmStatic external fun drawn(predictor: Long, sample: Int, number: Int): Long
-    @JvmStatic external fun uncertainty(predictor: Long, sample: Int, number: Int): FloatArray
+    @JvmStatic external fun sample(predictor: Long, sampleCount: Int, frameCount: Int, stepS: Double)
+    @JvmStatic external fun cancelPredictor(predictor: Long)
+    @JvmStatic external fun acquireSample(predictor: Long, sampleIndex: Int, frameIndex: Int): Long
+    @JvmStatic external fun entropyMap(predictor: Long, sampleIndex: Int, frameIndex: Int): FloatArray
     @JvmStatic external fun resetPredictor(predictor: Long)
     @JvmStatic external fun statsOfPredictor(predictor: Long): DoubleArray
 
-    /** [networksOf]: another stream, and no bundle is read; or 0. */
+    /** [sharedWith]: another stream, and no bundle is read; or 0. */
     @JvmStatic
-    external fun createSurprise(
+    external fun createNovelty(
         context: Long,
         folder: ByteArray?,
         names: Array<ByteArray>?,
         buffers: Array<ByteBuffer>?,
         values: DoubleArray,
-        networksOf: Long,
+        sharedWith: Long,
     ): Long
 
-    @JvmStatic external fun destroySurprise(surprise: Long)
+    @JvmStatic external fun destroyNovelty(novelty: Long)
 
-    /** Columns, rows, bits and ratio, whether it is an event, a cut and a start; then the map. */
-    @JvmStatic external fun pushToSurprise(surprise: Long, frame: Long): FloatArray
-    @JvmStatic external fun rebuilt(surprise: Long): Long
-    @JvmStatic external fun resetSurprise(surprise: Long)
-    @JvmStatic external fun statsOfSurprise(surprise: Long): DoubleArray
+    /** Columns, rows, bits, ratio, is event, is cut, is stream start; then the map. */
+    @JvmStatic external fun pushToNovelty(novelty: Long, frame: Long): FloatArray
+    @JvmStatic external fun reconstruction(novelty: Long): Long
+    @JvmStatic external fun resetNovelty(novelty: Long)
+    @JvmStatic external fun statsOfNovelty(novelty: Long): DoubleArray
 
     /** [source]: the handle of [kept], which native code keeps until the concealer is destroyed. */
     @JvmStatic external fun createConcealer(context: Long, source: Long, kept: Source, values: DoubleArray): Long

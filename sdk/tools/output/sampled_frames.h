@@ -1,0 +1,49 @@
+// `maquette predict --samples`: several possible futures of one stream.
+#pragma once
+
+#include <cstdint>
+#include <maquette/maquette.hpp>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+struct SampleOptions {
+  int samples = 0;  // 0: none
+  double temperature = 1;
+  uint32_t top_k = 0;
+  uint64_t seed = 0;
+
+  void apply(maq_predictor_config* config) const {
+    config->temperature = float(temperature);
+    config->top_k = top_k;
+    config->seed = seed;
+  }
+};
+
+class SampledFrames {
+ public:
+  // `bundle`: a folder; "": the bundle installed with the library.
+  SampledFrames(const maquette::Context& context, const SampleOptions& options, const std::string& bundle, int threads);
+
+  void push(const maquette::Frame& frame) { predictor_.push(frame); }
+  // Samples `frames` frames, `step_s` apart. Steps that are longer than the networks know are split.
+  void sample(int64_t frames, double step_s);
+
+  int count() const { return options_.samples; }
+  // Decodes frame `number` (1-based) of sample `sample` (0-based).
+  maquette::Frame frame(int sample, int64_t number) {
+    return predictor_.acquire_sample(uint32_t(sample), steps(number));
+  }
+  // Returns the entropy map of frame `number`, the mean of all samples.
+  std::vector<float> entropy_map(int64_t number) const;
+
+ private:
+  uint32_t steps(int64_t number) const { return uint32_t(number * steps_a_frame_); }
+
+  const SampleOptions options_;
+  maquette::Predictor predictor_;
+  int64_t steps_a_frame_ = 1;
+};
+
+// Returns the BGR image with uncertain cells in red.
+cv::Mat draw_entropy_map(const std::vector<float>& bits, const cv::Mat& image);

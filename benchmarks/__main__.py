@@ -5,11 +5,11 @@
     python -m benchmarks --only runtimes  one section; the others are kept from the last run in --out
     python -m benchmarks --publish        also copies the report to docs/benchmarks
 
-Sections: frames (people, pixels, threads; start, memory), startup (libraries, their size, CPU time), ui_latency (waits
-of an app with a window), sweep (error against run time), person_sizes (the same for small, tilted and crowded people),
-frame_budget (a device that throttles), agreement (int8 against fp32), runtimes (other runtimes and the roofline),
-cameras (capture), scenes (new views of captured scenes), edges (fields of depth frames), prediction (next frames of
-clips).
+Sections: frames (people, pixels, threads; start, memory), startup (libraries, their size, CPU time), sizes (the
+library without some systems), ui_latency (waits of an app with a window), sweep (error against run time), person_sizes
+(the same for small, tilted and crowded people), frame_budget (a device that throttles), agreement (int8 against fp32),
+runtimes (other runtimes and the roofline), cameras (capture), scenes (new views of captured scenes), edges (fields of
+depth frames), prediction (next frames of clips).
 Each section records its commit and date. --publish refuses sections of different commits, and uncommitted changes.
 Exit status: 0 if every target is met, 1 if one is missed, 2 if a section could not be measured or published.
 """
@@ -27,15 +27,26 @@ from pathlib import Path
 
 from maquette import MaquetteError
 
-from benchmarks import cameras, frame_budget, frame_time, prediction, provenance, report, startup, targets, ui_latency
+from benchmarks import (
+    cameras,
+    frame_budget,
+    frame_time,
+    prediction,
+    provenance,
+    report,
+    sizes,
+    startup,
+    targets,
+    ui_latency,
+)
 from benchmarks.edges import measure as edges
 from benchmarks.scenes import measure as scenes
 from benchmarks.scenes.command import SceneCommandError
 from export.shards import read_images, shard_paths
 
 SCHEMA = "maquette-benchmark-5"
-SECTIONS = ("frames", "startup", "ui_latency", "sweep", "person_sizes", "frame_budget", "agreement", "runtimes",
-            "cameras", "scenes", "edges", "prediction")  # fmt: skip
+SECTIONS = ("frames", "startup", "sizes", "ui_latency", "sweep", "person_sizes", "frame_budget", "agreement",
+            "runtimes", "cameras", "scenes", "edges", "prediction")  # fmt: skip
 RUNTIME_RATIOS = (("openvino_int8", "OpenVINO", "int8"), ("pytorch_fp32", "PyTorch", "fp32"))
 INT8 = Path("sdk/models/densepose-b-int8")
 CHECKPOINT = Path("export/weights/densepose-b.pt")
@@ -141,6 +152,9 @@ def measure(options: argparse.Namespace) -> dict:
     if "startup" in options.only:
         document["startup"], found = startup.measure(options.quick)
         replace(metrics, missing, startup.METRICS, found, {})
+    if "sizes" in options.only:
+        document["sizes"], found, why = sizes.measure(options.quick, options.out)
+        replace(metrics, missing, sizes.METRICS, found, why)
     if "ui_latency" in options.only:
         document["ui_latency"], found, why = ui_latency.measure(options.quick)
         replace(metrics, missing, ui_latency.METRICS, found, why)

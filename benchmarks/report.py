@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks import camera_section, frame_budget, person_sizes, prediction, provenance, startup, ui_latency
+from benchmarks import camera_section, frame_budget, person_sizes, prediction, provenance, sizes, startup, ui_latency
 from benchmarks.edges import plots as edge_plots
 from benchmarks.edges import section as edge_section
 from benchmarks.scenes import plots as scene_plots
@@ -221,6 +221,7 @@ SECTIONS = {
     "frame_budget": frame_budget.section,
     "frames": frames_section,
     "startup": startup.section,
+    "sizes": sizes.section,
     "ui_latency": ui_latency.section,
     "runtimes": runtimes_section,
     "agreement": agreement_section,

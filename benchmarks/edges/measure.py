@@ -201,7 +201,7 @@ def measure_fields(given: Sources, networks: Networks, folder: Path, threads: in
     document = {
         "views": {"val": len(val), "test": len(test), "solids": len({solid_of(view) for view in test})},
         "errors": errors.rows, "groups": errors.groups, "agreement": errors.agreement, "sets": sets, "round": of_round,
-        "missing": {**networks.missing, **errors.missing, **programs_missing()},
+        "missing": {**networks.missing, **errors.missing},
         "sheet": plots.write_sheet(errors.shown, folder).name,
     }  # fmt: skip
     metrics = quality.metrics_from(errors.rows, errors.agreement)
@@ -271,15 +271,3 @@ def set_ratio(rows: Sequence[dict], own: Sequence[dict]) -> float:
     """Returns the largest ratio over levels of the RMSE on a set to that on synthetic solids."""
     ours = {row["level"]: row["rmse_r"] for row in own if row["way"] == SHIPPED}
     return max(row["rmse_r"] / ours[row["level"]] for row in rows if row["rmse_r"] is not None)
-
-
-def programs_missing() -> dict[str, str]:
-    """Baselines that other libraries bring, and why they are not here."""
-    found = {}
-    for name, header in (
-        ("Voronoi covariance (CGAL)", "CGAL/vcm_estimate_edges.h"),
-        ("OrganizedEdgeFromNormals (PCL)", "pcl-1.13/pcl/features/organized_edge_detection.h"),
-    ):
-        here = (Path("/usr/include") / header).exists()
-        found[name] = "this benchmark has no program for it" if here else f"{header} is not installed"
-    return found

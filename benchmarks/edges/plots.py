@@ -98,7 +98,7 @@ def groups(measured: dict) -> plt.Figure:
 
 def write_sheet(shown: list[dict], folder: Path) -> Path:
     """Writes a row for each view and sensor: input, true field, and the field of each method with its RMSE."""
-    ways = ["what the network reads", "true field", SHIPPED, *BASELINES]
+    ways = ["network's input", "true field", SHIPPED, *BASELINES]
     figure, axes = plt.subplots(len(shown), len(ways), figsize=(2.6 * len(ways), 2.1 * len(shown)), squeeze=False,
                                 layout="constrained")  # fmt: skip
     for line, row in zip(axes, shown, strict=True):

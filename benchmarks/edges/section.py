@@ -75,7 +75,7 @@ def heads() -> list[str]:
 
 
 def error_rows(rows: list[dict]) -> list[list[str]]:
-    table = [["depth, way", *heads(), "ms"]]
+    table = [["depth, method", *heads(), "ms"]]
     for level in LEVELS:
         of_level = [row for row in rows if row["level"] == level]
         for row in of_level:
@@ -109,8 +109,8 @@ def set_parts(sets: dict) -> list:
 
 
 def sheet_parts(name: str) -> list:
-    caption = ("Test views, what is read of them, and their fields: bright at edges, black where depth is unknown, "
-               "grey where there is no label. Under each, its RMSE.")  # fmt: skip
+    caption = ("Test views, the network's input, and fields: bright at edges, black for unknown depth, grey without a "
+               "label. Below each field is its RMSE.")  # fmt: skip
     return [(name, caption)] if name else []
 
 

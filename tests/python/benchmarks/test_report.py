@@ -62,6 +62,7 @@ def document():
              "demo_missing": "there is no <Xvfb>", "warnings": []}  # fmt: skip
     return {"machine": MACHINE, "cameras": measured, "scenes": unseen, "edges": edges_document(),
             "prediction": prediction_document(), "ui_latency": waits,
+            "sizes": {"configurations": {"densepose": {"library_bytes": 1_150_000, "models_bytes": 2_700_000}}},
             "startup": {"processes": processes, "files": {"library": file}, "warnings": []},
             "frames": frames, "sweep": rows, "person_sizes": sizes, "threads": 2,
             "frame_budget": {"missing": "no control group can be made: <mkdir>"},

@@ -23,10 +23,9 @@ MAQ_API maq_status maq_prediction_model_create(maq_context* context, const maq_p
  * Any thread. Does not fail or block. */
 MAQ_API const maq_frame* maq_pipeline_result_get_predicted_frame(const maq_pipeline_result* result);
 
-/* Gets the novelty score of the frame of a result. The caller sets score->struct_size. The score has no map: columns and
- * rows are 0.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the model does not score novelty). Does not
- * block. */
+/* Gets the novelty score of the frame of a result. The caller sets score->struct_size. The score has no map: columns
+ * and rows are 0. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (the model does not score
+ * novelty). Does not block. */
 MAQ_API maq_status maq_pipeline_result_get_novelty(const maq_pipeline_result* result, maq_novelty_score* score);
 
 #ifdef __cplusplus

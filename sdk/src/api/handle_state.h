@@ -46,7 +46,7 @@ class HandleState {
 
   // Of any kind.
   bool is_held() const;
-  bool is_held_as(HandleKind kind) const { 
+  bool is_held_as(HandleKind kind) const {
     return (word_.load(std::memory_order_relaxed) & ~(kInUse | kPart)) == held(kind);
   }
   // In a child of fork(), the objects of the parent have no threads, their mutexes may be locked for good, and their

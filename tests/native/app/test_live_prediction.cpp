@@ -147,8 +147,8 @@ TEST(LivePrediction, EachFrameHasEntropyAndASampleWhereFramesWait) {
     EXPECT_EQ(frame.sample_age_ms, 0);
     EXPECT_EQ(frame.sampled.ahead_s, 0.2);
     EXPECT_EQ(frame.sampled.bits.size(), 256u);
-    EXPECT_EQ(frame.sampled.picture.width_px, 256);
-    EXPECT_EQ(frame.sampled.picture.height_px, 192);
+    EXPECT_EQ(frame.sampled.image.width_px, 256);
+    EXPECT_EQ(frame.sampled.image.height_px, 192);
   }
   const auto most = [](const std::vector<float>& bits) { return *std::max_element(bits.begin(), bits.end()); };
   EXPECT_EQ(most(seen[0].sampled.bits), 0) << "of one frame, no motion is known";
@@ -192,7 +192,7 @@ TEST(LivePrediction, WithoutSamplingNetworksTheImageGoesOn) {
   run.live.open("stub:people?size=160x120&frames=3");
   ASSERT_TRUE(run.until_ended());
   EXPECT_FALSE(run.live.status().has_failed);
-  EXPECT_NE(run.live.status().problem.find("tiny-prediction has no networks"), std::string::npos)
+  EXPECT_NE(run.live.status().problem.find("tiny-prediction has no network for sampled"), std::string::npos)
       << run.live.status().problem;
   EXPECT_EQ(run.seen().size(), 3u);
   EXPECT_EQ(run.seen().back().sampled.number, 0u);

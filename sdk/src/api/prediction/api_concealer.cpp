@@ -5,9 +5,9 @@
 #include "api/boundary.h"
 #include "api/prediction/prediction_methods.h"
 #include "api/source_handle.h"
+#include "concealment/concealer.h"
 #include "core/worker_threads.h"
 #include "maquette/concealer.h"
-#include "concealment/concealer.h"
 
 using namespace maq;
 

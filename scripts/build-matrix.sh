@@ -25,6 +25,7 @@ done
 
 jobs="${MAQ_JOBS:-$(nproc)}"
 root="build/matrix"
+mkdir -p "$root"
 table=()
 json=
 for name in "${names[@]}"; do
@@ -64,7 +65,7 @@ for name in "${names[@]}"; do
   library="$(find "$folder/prefix" -name 'libmaquette.so.*.*.*')"
   echo '#include <maquette/maquette.h>
     int main(void) { maq_context* context = 0; return maq_context_create(MAQ_HEADER_VERSION, 0, &context); }' \
-    | cc -std=c99 -x c - -o "$folder/prefix/program" "-I$folder/prefix/include" "$library" \
+    | cc -std=c99 "-I$folder/prefix/include" -x c - -x none "$library" -o "$folder/prefix/program" \
       "-Wl,-rpath,$(dirname "$(realpath "$library")")"
   "$folder/prefix/program"
   bytes=$(stat -c %s "$library")

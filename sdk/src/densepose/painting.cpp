@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kBandRows = 16;  // even; converted at once, in the cache
 
-// Of a part: what it adds to a channel, and how much of the frame stays, both times 255.
+// Colour of a part: the value it adds to a channel, and the weight of the frame, both times 255.
 struct Paint {
   std::array<int, 3> rgb;
   int kept;

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/frame.h"
-#include "densepose/dense_decode.h"
+#include "densepose/surface/dense_decode.h"
 
 namespace maq {
 

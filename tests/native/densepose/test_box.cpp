@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "densepose/box.h"
+#include "densepose/detector/box.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <random>
 
-#include "densepose/chart_predictor.h"
+#include "densepose/surface/chart_predictor.h"
 #include "support/expect_error.h"
 
 namespace {

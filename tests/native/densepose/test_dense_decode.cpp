@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "densepose/dense_decode.h"
+#include "densepose/surface/dense_decode.h"
 
 namespace {
 

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "densepose/bundle/manifest.h"
 #include "densepose/densepose.h"
-#include "densepose/manifest.h"
 #include "support/expect_error.h"
 #include "support/samples/bundle_copy.h"
 
@@ -24,7 +24,7 @@ TEST(DensePoseManifest, ReadsEveryField) {
   EXPECT_EQ(spec.rpn.post_nms_top_k, 100);
   EXPECT_FLOAT_EQ(spec.box_head.delta_weights[2], 5);
   EXPECT_FALSE(spec.box_head.second_pass_threshold.has_value());
-  EXPECT_EQ(spec.box_head.evidence_stride, 0);
+  EXPECT_EQ(spec.box_head.person_logits_stride, 0);
   EXPECT_EQ(spec.charts_file, "charts.f32");
   EXPECT_EQ(spec.dense_head.output_size, 64);
   EXPECT_EQ(spec.surface_file, "");

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "densepose/person_crop.h"
+#include "densepose/crops/person_crop.h"
 
 namespace {
 

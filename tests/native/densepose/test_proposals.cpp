@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "densepose/proposals.h"
+#include "densepose/detector/proposals.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "densepose/roi_align.h"
+#include "densepose/detector/roi_align.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // The whole image, upright, as the networks see it.
-#include "densepose/rotated_input.h"
+#include "densepose/detector/rotated_input.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "densepose/surface_grid.h"
+#include "densepose/surface/surface_grid.h"
 #include "support/expect_error.h"
 
 namespace {

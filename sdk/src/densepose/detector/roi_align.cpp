@@ -1,4 +1,4 @@
-#include "densepose/roi_align.h"
+#include "densepose/detector/roi_align.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "densepose/box.h"
-#include "densepose/manifest.h"
+#include "densepose/bundle/manifest.h"
+#include "densepose/detector/box.h"
 
 namespace maq {
 

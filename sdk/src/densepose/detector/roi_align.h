@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "densepose/box.h"
+#include "densepose/detector/box.h"
 
 namespace maq {
 

@@ -1,4 +1,4 @@
-#include "densepose/manifest.h"
+#include "densepose/bundle/manifest.h"
 
 #include <algorithm>
 #include <variant>
@@ -52,7 +52,7 @@ BoxHeadSpec read_box_head(const ManifestNode& node) {
   head.score_threshold = node.at("score_threshold").number(0, 1);
   head.nms_iou = node.at("nms_iou").number(0, 1);
   if (const auto threshold = node.find("second_pass_threshold")) head.second_pass_threshold = threshold->number(0, 1);
-  if (const auto stride = node.find("evidence_stride")) head.evidence_stride = stride->integer(1, 1024);
+  if (const auto stride = node.find("evidence_stride")) head.person_logits_stride = stride->integer(1, 1024);
   head.max_people = node.at("max_people").integer(1, 255);
   return head;
 }
@@ -69,7 +69,7 @@ DenseHeadSpec read_dense_head(const ManifestNode& node) {
   return head;
 }
 
-// Those of a graph's tensors that are called `names`, in this order; the manifest may list more, in any order.
+// Selects the tensors of a graph that are called `names`, in this order; the manifest may list more, in any order.
 std::vector<TensorSpec> named(const std::vector<TensorSpec>& tensors, const std::vector<std::string>& names,
                               const std::string& where) {
   std::vector<TensorSpec> chosen;

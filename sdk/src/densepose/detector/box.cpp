@@ -1,4 +1,4 @@
-#include "densepose/box.h"
+#include "densepose/detector/box.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "densepose/surface_grid.h"
+#include "densepose/surface/surface_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,7 @@ SurfaceGrid decode_surface_grid(const std::vector<uint8_t>& bytes, const std::st
   for (size_t axis = 0; axis < 3; ++axis) {
     low_m[axis] = float_at(bytes, 16 + 4 * axis);
     high_m[axis] = float_at(bytes, 28 + 4 * axis);
-    // Of NaN too this is false.
+    // NaN also makes this false.
     if (!(low_m[axis] >= -kMaxDistance_m && low_m[axis] <= high_m[axis] && high_m[axis] <= kMaxDistance_m)) {
       fail(" is a damaged surface grid: it reaches from ", low_m[axis], " to ", high_m[axis], " m.");
     }

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "densepose/box.h"
-#include "densepose/chart_predictor.h"
+#include "densepose/detector/box.h"
+#include "densepose/surface/chart_predictor.h"
 #include "image/crop_input.h"
 
 namespace maq {
@@ -52,7 +52,7 @@ struct ResizeTap {
   float fraction = 0;  // weight of `high`
 };
 
-// What painting a person needs in between; kept from person to person.
+// Scratch memory of painting a person; kept from person to person.
 struct DecodeMemory {
   std::vector<ResizeTap> rows, columns;
   std::vector<float> odds;       // of each cell: log(p / (1 - p)), p the probability that it shows the person
@@ -82,8 +82,8 @@ float min_log_odds(float mask_threshold);
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
                           float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
 
-// Likewise, of a box that is rotated in the image: `to_cells` takes places of the image to the cells of the logits, of
-// which cell (0, 0) covers [0, 1) x [0, 1). Paints the pixels whose centres lie in the cells.
+// Paints a person whose box is rotated in the image, like paint_person(): `to_cells` takes places of the image to the
+// cells of the logits, of which cell (0, 0) covers [0, 1) x [0, 1). Paints the pixels whose centres lie in the cells.
 DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
                                   float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
                                   DensePlanes& planes);

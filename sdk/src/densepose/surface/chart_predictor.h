@@ -30,7 +30,7 @@ class ChartPredictor : public ChartValues {
   int channels() const { return channels_; }
   // Turns to another person: `surface` [size, size, channels], which must stay until the next call.
   void begin(const float* surface, int size);
-  // Of the output [2 * size, 2 * size].
+  // `row` and `column` are of the output, [2 * size, 2 * size].
   ChartPoint at(int part, int row, int column) override;
 
  private:

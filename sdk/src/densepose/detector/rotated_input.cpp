@@ -1,4 +1,4 @@
-#include "densepose/rotated_input.h"
+#include "densepose/detector/rotated_input.h"
 
 #include <algorithm>
 #include <cmath>

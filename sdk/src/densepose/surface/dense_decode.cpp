@@ -1,4 +1,4 @@
-#include "densepose/dense_decode.h"
+#include "densepose/surface/dense_decode.h"
 
 #include <algorithm>
 #include <array>
@@ -87,8 +87,9 @@ class ClassRow {
   std::vector<float>& values_;
 };
 
-// Of each cell log(p / (1 - p)), p the probability that it shows the person, whichever part: the logits of all coarse
-// classes but the background, summed as probabilities, against the background's. A class that is NaN counts as absent.
+// Computes log(p / (1 - p)) of each cell, p the probability that it shows the person, whichever part: the logits of all
+// coarse classes but the background, summed as probabilities, against the background's. A class that is NaN counts as
+// absent.
 MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<float>& odds) {
   const int parts = logits.coarse_classes - 1;
   const int padded = round_up(parts, kLanes);
@@ -127,7 +128,7 @@ MAQ_SIMD_CLONES void person_log_odds(const DenseLogits& logits, std::vector<floa
   }
 }
 
-// Of each cell the part with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
+// Finds the part of each cell with the largest logit, from 0 (of equal ones the lowest); -1 if all are NaN.
 MAQ_SIMD_CLONES void best_parts(const DenseLogits& logits, std::vector<int16_t>& best) {
   const int parts = logits.index_classes - 1;
   const int padded = round_up(parts, kLanes);
@@ -253,7 +254,7 @@ class Painter {
       ++taken_;
       return;
     }
-    // What is largest in all four cells around a pixel is so between them.
+    // A part that is largest in all four cells around a pixel is the largest between them.
     const int16_t* const low = best_.data() + size_t(row.low) * size_t(size_);
     const int16_t* const high = best_.data() + size_t(row.high) * size_t(size_);
     int part = low[column.low];

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "densepose/dense_decode.h"
+#include "densepose/surface/dense_decode.h"
 #include "image/crop_input.h"
 
 namespace maq {

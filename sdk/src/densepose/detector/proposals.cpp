@@ -1,4 +1,4 @@
-#include "densepose/proposals.h"
+#include "densepose/detector/proposals.h"
 
 #include <algorithm>
 #include <cmath>

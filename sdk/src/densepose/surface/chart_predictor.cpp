@@ -1,4 +1,4 @@
-#include "densepose/chart_predictor.h"
+#include "densepose/surface/chart_predictor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,7 @@ inline float dot(const float* a, const float* b, size_t count) {
   return sum;
 }
 
-// What the kernels [4, 4, channels] of U and V give at a cell of the output; features [size, size, channels].
+// Applies the kernels [4, 4, channels] of U and V at a cell of the output; features [size, size, channels].
 MAQ_SIMD_CLONES ChartPoint transposed_convolution(const float* features, int size, size_t channels,
                                                   const float* kernel_u, const float* kernel_v, int row, int column) {
   ChartPoint sum;

@@ -1,4 +1,4 @@
-// What a manifest says of dense pose (docs/reference/formats.md), read and checked.
+// The part of a manifest that describes dense pose (docs/reference/formats.md), read and checked.
 #pragma once
 
 #include <array>
@@ -31,8 +31,9 @@ struct BoxHeadSpec {
   float nms_iou = 0;
   // Boxes with a higher score go through the box head again, from where its first pass put them; none: one pass.
   std::optional<float> second_pass_threshold;
-  // Of the trunk's output `person`, whose mean over a box is added to the logit of a person; 0: it has none.
-  int evidence_stride = 0;
+  // Stride of the person-logit map, the trunk's output `person`; 0: the trunk has none. Its mean over a box is added to
+  // the logit of a person.
+  int person_logits_stride = 0;
   int max_people = 0;
 };
 
@@ -72,7 +73,7 @@ std::vector<std::string> at_levels(const std::string& name, int first, int last)
 GraphSpec graph_with(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& inputs,
                      const std::vector<std::string>& outputs);
 
-// Of P2, the first output of a trunk, and so of all levels.
+// Returns the channels of P2, the first output of a trunk; all levels have as many.
 int feature_channels(const GraphSpec& trunk, const std::string& bundle_name);
 
 // The shapes of all inputs, and of the outputs, of which the last shape is that of all further ones. Where the manifest

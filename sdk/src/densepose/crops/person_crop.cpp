@@ -1,4 +1,4 @@
-#include "densepose/person_crop.h"
+#include "densepose/crops/person_crop.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kContext = 1.15;  // the crop's side over the long side of the person's box
-// Of the dense head's cells; fewer give no direction.
+// Counts of cells of the dense head; fewer give no direction.
 constexpr int kMinTorsoCells = 16, kMinHeadCells = 6;
 constexpr double kMinAgreement = 0.1;  // length of the sum of two unit vectors
 
@@ -57,7 +57,7 @@ struct Bounds {
   }
 };
 
-// Of the cells that show the person, where `map` takes them; of all cells where none does.
+// Bounds of the cells that show the person, mapped by `map`; of all cells if none does.
 Bounds bounds_of_person(int size, const AffineMap& map, float mask_threshold, const DecodeMemory& memory) {
   const float min_odds = min_log_odds(mask_threshold);
   Bounds bounds;

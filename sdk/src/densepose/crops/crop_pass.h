@@ -1,0 +1,69 @@
+// A second pass over people, each in a crop of the image at full resolution; and tracking of people in crops.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/frame.h"
+#include "densepose/bundle/settings.h"
+#include "densepose/crops/person_crop.h"
+#include "densepose/detector/box.h"
+#include "densepose/detector/trunk.h"
+#include "densepose/surface/surface_mapper.h"
+#include "image/crop_input.h"
+
+namespace maq {
+
+// A person with the answer of a dense head.
+struct MappedPerson {
+  ScoredBox found;                       // in pixels of the network's input
+  Box box;                               // in pixels of the image
+  Box beyond_body;                       // from the bounds of the painted body to `box`, of the latest key frame
+  std::optional<PersonCrop> first_view;  // the region of the first answer, in an image that was rotated
+  std::optional<PersonCrop> crop;
+  float confidence = 0;             // of the answer in use
+  int64_t body_pixels = 0;          // when last painted
+  SurfaceAnswer answer;             // of the crop if there is one
+  SurfaceMapper* mapper = nullptr;  // gave the answer
+
+  DenseLogits logits() const { return mapper->logits_of(answer); }
+};
+
+class CropPass {
+ public:
+  // Opens crop networks if the bundle has them and the settings have crops; otherwise crops go through `trunk` and
+  // `mapper`. The arguments but `networks` must outlive this. The settings are resolved.
+  CropPass(const DensePoseNetworks& networks, const DensePoseSpec& spec, const DensePoseSettings& settings,
+           Trunk& trunk, SurfaceMapper& mapper);
+
+  // Returns the score of a person from the box head that may reach `threshold` with the confidence of its parts.
+  float min_box_score(float threshold) const;
+  // Returns the score with the confidence of the answer.
+  float score_of(const MappedPerson& person) const;
+
+  // Gives crops to the people who gain by one. `up`: in the image, a unit vector.
+  void choose(std::vector<MappedPerson>& people, const Point& up);
+  // Runs trunk and dense head over the crops of `people`. A new answer replaces the first one unless it is clearly less
+  // confident; then the person loses the crop. Returns the number of crops; `*provider` is set if there are any.
+  int run(const ImageView& image, std::vector<MappedPerson>& people, RunCancel& cancel, maq_provider* provider);
+  // Gives a person who was just painted the crop for the next frame, and between key frames a new box. `painted` holds
+  // the classified cells of the answer; the sizes are those of the image.
+  void follow(MappedPerson& person, bool is_key_frame, int width_px, int height_px, const Point& up,
+              const DecodeMemory& painted) const;
+
+ private:
+  const DensePoseSpec& spec_;
+  const DensePoseSettings& settings_;
+  std::unique_ptr<Trunk> own_trunk_;
+  std::unique_ptr<SurfaceMapper> own_mapper_;
+  Trunk& trunk_;
+  SurfaceMapper& mapper_;
+  // Scratch of a frame.
+  CropInput input_;
+  DecodeMemory memory_;
+  std::vector<float> first_answers_;  // while the dense head runs again
+};
+
+}  // namespace maq

@@ -25,7 +25,7 @@ class Camera:
 
     @staticmethod
     def centred(width_px: int, height_px: int, focal_px: float, rotation: np.ndarray, centre: np.ndarray) -> Camera:
-        """Square pixels, and the principal point in the middle of the picture."""
+        """Square pixels, and the principal point in the middle of the image."""
         middle = (width_px - 1) / 2, (height_px - 1) / 2
         return Camera(width_px, height_px, focal_px, focal_px, *middle, rotation, centre)
 
@@ -60,7 +60,7 @@ class Camera:
         return (rays * np.asarray(depth, np.float64)[:, None]) @ self.rotation + self.centre
 
     def resized(self, width_px: int, height_px: int) -> Camera:
-        """A smaller or larger picture of the same field of view."""
+        """A smaller or larger image of the same field of view."""
         scale_x, scale_y = width_px / self.width_px, height_px / self.height_px
         return replace(
             self,
@@ -73,7 +73,7 @@ class Camera:
         )
 
     def shrunk(self, factor: int, min_side_px: int = 1) -> Camera:
-        """A picture of the same field of view with a fraction of the width and height, rounded down."""
+        """An image of the same field of view with a fraction of the width and height, rounded down."""
         return self.resized(max(self.width_px // factor, min_side_px), max(self.height_px // factor, min_side_px))
 
     def reframed(self, left_px: int, top_px: int, width_px: int, height_px: int) -> Camera:

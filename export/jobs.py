@@ -1,7 +1,7 @@
 """Jobs in processes of this machine, or of many machines through Dask.
 
 Each process serves one job after another; one that takes too long, or takes its process down with it, is given up and
-the others go on. (Mesa's llvmpipe never finishes some pictures; a place lost is better than a set that never ends.)
+the others go on. (Mesa's llvmpipe never finishes some images; a place lost is better than a set that never ends.)
 
 Many machines: a scheduler on one, workers on all, each started in a checkout with the same assets; what jobs write must
 lie in a folder that all of them share. A job whose machine is lost is done again elsewhere.

@@ -1,7 +1,7 @@
 """Do the int8 networks say the same as the fp32 ones? Labels of both, pixel by pixel, through the C API.
 
 The gate is label agreement: of the pixels of people in the fp32 result, the share that has the same part in the
-int8 result. Both bundles run on the same pictures at the bundle's own threshold, as in an app.
+int8 result. Both bundles run on the same images at the bundle's own threshold, as in an app.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Agreement:
 
 
 class Tally:
-    """Sums over pairs of results of the same picture."""
+    """Sums over pairs of results of the same image."""
 
     def __init__(self) -> None:
         self._images = self._same_count = self._pixels = self._both = self._same = self._either = 0
@@ -191,7 +191,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--in-float", nargs="+", default=[], metavar="GRAPH", help="of the int8 bundle, not int8")
     parser.add_argument("--limit", type=int, metavar="N", help="at most so many images")
     parser.add_argument("--backend", choices=("capi", "onnx"), default="capi", help="default: capi")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the metrics there")
     arguments = parser.parse_args(argv)
     try:
         images = load_images(arguments.images, arguments.limit)

@@ -80,7 +80,7 @@ def figures_of(errors: list[TensorError]) -> dict[str, list[float | None]]:
 
 
 def _finite(value: float | None) -> float | None:
-    """JSON has no infinity: a tensor without error, or silent on these pictures, has no figure."""
+    """JSON has no infinity: a tensor without error, or silent on these images, has no figure."""
     return None if value is None or not math.isfinite(value) else round(value, 2)
 
 

@@ -130,10 +130,10 @@ def measure(names: list[str], height: int, width: int, rounds: int) -> dict[str,
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--size", default="640x480", help="of the picture, multiples of 16")
+    parser.add_argument("--size", default="640x480", help="of the image, multiples of 16")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--only", default="", help="candidates whose name begins so")
-    parser.add_argument("--json", type=Path, help="also write the figures here")
+    parser.add_argument("--json", type=Path, help="also write the metrics here")
     options = parser.parse_args()
     width, height = (int(side) for side in options.size.split("x"))
     if width % 16 or height % 16:

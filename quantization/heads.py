@@ -1,4 +1,4 @@
-"""Makes an int8 bundle of heads from a fp32 one of export.heads, calibrated on pictures of made heads.
+"""Makes an int8 bundle of heads from a fp32 one of export.heads, calibrated on images of made heads.
 
     python -m quantization.heads --fp32 .data/bundles/heads-fp32 --out sdk/models/heads-int8
     python -m quantization.heads --keep sdk/models/heads-int8         a new encoder for the shipped prior
@@ -141,7 +141,7 @@ def print_cost(cost: dict[str, dict[str, float]], what: str) -> None:
 
 def print_blocks(source: Path, settings: GraphSettings, calibration: list[Sample], crops: Sequence[Crop]) -> None:
     """A table of what each block gains that is left float (+), or loses that is not (-): sizes, decibels of each part,
-    figures on the crops."""
+    metrics on the crops."""
     given = samples(crops)
     expected = cells_of(source, given)
     table = Table(title="blocks left float, in the order of the graph", title_justify="left")

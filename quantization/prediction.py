@@ -40,7 +40,7 @@ def frames_of(data: Path, sets: Sequence[str], split: str, count: int) -> np.nda
 
 
 def codes_of(features: np.ndarray, codes: FrameCodes) -> np.ndarray:
-    """Numbers of the nearest entries, [places, slices]; the lowest of equals. features [1, side, side, slices *
+    """Numbers of the nearest entries, [cells, slices]; the lowest of equals. features [1, side, side, slices *
     width]."""
     slices, _, width = codes.entries.shape
     own = features.reshape(-1, slices, width).transpose(1, 0, 2)
@@ -81,7 +81,7 @@ Quality = dict[str, dict[str, float]]  # signal to noise in dB, by graph and out
 
 
 def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings) -> tuple[Quality, dict[str, float]]:
-    """Writes the graphs that see or make pictures into the int8 bundle; returns their quality and what int8 costs."""
+    """Writes the graphs that see or make images into the int8 bundle; returns their quality and what int8 costs."""
     codes = read_code_file(options.fp32 / CODES)
     calibrating = frames_of(options.data, options.sets, "train", settings.frames)
     held_out = frames_of(options.data, options.sets, "val", settings.held_out_frames)

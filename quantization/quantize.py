@@ -137,7 +137,7 @@ def eight_bit_weights(graph: onnx.GraphProto) -> dict[str, list[dict[str, object
 def equal_sizes(samples: list[Sample]) -> list[Sample]:
     """Samples of [N, …] arrays as single ones of one size, [1, …], which histograms of activations need.
 
-    Pictures and their features get zeros at the right and bottom, as at run time.
+    Images and their features get zeros at the right and bottom, as at run time.
     """
     shape = {name: np.max([s[name].shape[1:] for s in samples], axis=0) for name in samples[0]}
     singles = [

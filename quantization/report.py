@@ -102,7 +102,7 @@ def document(
 
 
 def _row(tensor: TensorError) -> dict:
-    """Rounded; infinite figures (no error at all) and those that do not apply are null."""
+    """Rounded; infinite metrics (no error at all) and those that do not apply are null."""
     values = asdict(tensor)
     for key in ("here", "worst_channel", "gathered", "jump"):
         values[key] = check._finite(values[key])

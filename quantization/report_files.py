@@ -1,4 +1,4 @@
-"""The quantization report as Markdown and as a picture."""
+"""The quantization report as Markdown and as an image."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from quantization.analysis.comparison import TensorError
 
 BEGIN, END = "<!-- begin: written by python -m quantization.report -->", "<!-- end -->"
 SHOWN = 15
-NAMED = 3  # tensors named in each graph of the picture, if they lose more than 1 dB
+NAMED = 3  # tensors named in each graph of the image, if they lose more than 1 dB
 
 
 def write_markdown(path: Path, document: dict) -> None:

@@ -1,4 +1,4 @@
-"""Pictures that scene networks are calibrated on and compared by: photos of captures, made from the best others."""
+"""Images that scene networks are calibrated on and compared by: photos of captures, made from the best others."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from export.scenes.image_quality import psnr_db
 from quantization.bundle_networks import BundleNetworks
 from quantization.samples import Sample
 
-SOURCES = 8  # photos that a picture is made from while calibrating and comparing
+SOURCES = 8  # photos that an image is made from while calibrating and comparing
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A photo of a capture, and those that its picture is made from."""
+    """A photo of a capture, and those that its image is made from."""
 
     capture: Capture
     target: int
@@ -48,7 +48,7 @@ def shots(captures: Sequence[Capture], count: int, held_out: bool) -> list[Shot]
 
 @torch.no_grad()
 def psnrs_db(networks: nn.Module, wanted: Sequence[Shot], what: str) -> list[float]:
-    """The PSNR of each picture, rendered with these networks, against its photo."""
+    """The PSNR of each image, rendered with these networks, against its photo."""
     figures = []
     for shot in tqdm(wanted, desc=what, unit="picture", leave=False):
         options = Options(up=shot.capture.up)

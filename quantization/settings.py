@@ -59,7 +59,7 @@ class DensePoseSettings:
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """graphs: settings by graph name. views, held_out_views: how many pictures calibrate, and measure the error."""
+    """graphs: settings by graph name. views, held_out_views: how many images calibrate, and measure the error."""
 
     GRAPHS: ClassVar[tuple[str, ...]] = scenes.GRAPHS
 

@@ -1,6 +1,6 @@
 """The transformer of prediction in int8: products with weights take bytes; weights have 7 bits, which no processor's
 sums of products overflow. The context network finds scales for each input as it comes; those of slices and heads are
-fixed by training frames, so that a sample that is drawn depends on no other, and a place is the same alone and beside
+fixed by training frames, so that a sample that is drawn depends on no other, and a cell is the same alone and beside
 all others. Rows that codes stand for become bytes; attention, softmax and norms stay float."""
 
 from __future__ import annotations

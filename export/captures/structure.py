@@ -70,7 +70,7 @@ def up_of_cameras(rotations: np.ndarray) -> np.ndarray:
     """The direction [3] of length 1 that is up for cameras with `rotations` [N, 3, 3], world to camera.
 
     Cameras are held level more than they are held horizontally: x of all of them is at right angles to up. The mean of
-    what is up in the pictures, tilted where all look down from one side, is therefore turned to be so by least squares:
+    what is up in the images, tilted where all look down from one side, is therefore turned to be so by least squares:
     (sum x x^T + small) up = mean up. The same as sdk/src/scene/capture/scene_up.cpp.
     """
     across, up = rotations[:, 0], -rotations[:, 1].sum(0)

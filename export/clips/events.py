@@ -3,11 +3,11 @@ is a function of its clip and a generator.
 
 | kind | what happens at the frame | where |
 | --- | --- | --- |
-| freeze | the picture stands still until the end | all |
+| freeze | the image stands still until the end | all |
 | cut | another clip goes on | all |
 | drop | a third of a second is missing | all |
 | reversal | time runs backward from here | all |
-| blackout | the picture is black for three frames | all |
+| blackout | the image is black for three frames | all |
 | appears, vanishes | a piece of another clip is there from here on, or was there until here | a rectangle |
 | jump | that piece lies elsewhere from here on | both rectangles |
 """
@@ -74,7 +74,7 @@ def with_event(kind: str, rgb: np.ndarray, other: np.ndarray, fps: float, rng: n
 def _piece(
     picture: np.ndarray, rng: np.random.Generator
 ) -> tuple[np.ndarray, tuple[slice, slice], tuple[slice, slice]]:
-    """A rectangle of a picture, and two places for it that do not overlap."""
+    """A rectangle of an image, and two places for it that do not overlap."""
     sizes = [int(rng.uniform(*_PIECE) * side) for side in picture.shape[:2]]
 
     def place() -> tuple[slice, slice]:

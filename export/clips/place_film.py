@@ -97,14 +97,14 @@ class PlaceFilm:
         return self.renderer.context.vertex_array(program, [*parts, own])
 
     def colour(self, moment: PlaceMoment, sizes: Sequence[tuple[int, int]]) -> list[np.ndarray]:
-        """The picture, drawn once and averaged down to each (width, height), the last the largest: uint8 [H, W, 3]."""
+        """The image, drawn once and averaged down to each (width, height), the last the largest: uint8 [H, W, 3]."""
         self.renderer.show(list(moment.moving))
         factor = max(1, round(_SMALLEST_PX / max(sizes[-1])))
         image = self.renderer.colour(moment.camera.resized(*(factor * side for side in sizes[-1])), self.exposure)
         return [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for size in sizes]
 
     def labels(self, moment: PlaceMoment, then: PlaceMoment, size: tuple[int, int]) -> Labels:
-        """At the centres of the pixels of a picture of that (width, height)."""
+        """At the centres of the pixels of an image of that (width, height)."""
         self.renderer.show(list(moment.moving), shadows=False)
         camera, camera_then = moment.camera.resized(*size), then.camera.resized(*size)
         target = self._target(size)

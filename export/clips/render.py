@@ -19,7 +19,7 @@ import numpy as np
 from export.camera import Camera
 
 PATTERNS = ("plain", "checks", "stripes", "grain")
-_SAMPLING = 2  # of colour, a pixel and axis, at 320 px and more; small pictures take more
+_SAMPLING = 2  # of colour, a pixel and axis, at 320 px and more; small images take more
 _SHADOW_MAP = 512
 _NEAR, _FAR = 0.03, 60.0
 
@@ -152,7 +152,7 @@ def _shadow_matrix(light: Light) -> np.ndarray:
 
 
 def projection(camera: Camera, near: float = _NEAR, far: float = _FAR) -> np.ndarray:
-    """Camera to clip space, [4, 4]; the picture's first row is drawn first, so that it is read first. near, far:
+    """Camera to clip space, [4, 4]; the image's first row is drawn first, so that it is read first. near, far:
     metres."""
     w, h = camera.width_px, camera.height_px
     a, b = (far + near) / (far - near), -2 * far * near / (far - near)
@@ -251,7 +251,7 @@ class Renderer:
             self._arrays[program][k].render()
 
     def colour(self, moment: Moment, sizes: Sequence[tuple[int, int]]) -> list[np.ndarray]:
-        """The picture, drawn once and averaged down to each (width, height), the last the largest: uint8 [H, W, 3]."""
+        """The image, drawn once and averaged down to each (width, height), the last the largest: uint8 [H, W, 3]."""
         self._upload(self._positions, moment)
         self._shadow_target.use()
         self._shadow_target.clear()
@@ -272,7 +272,7 @@ class Renderer:
         return [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for size in sizes]
 
     def labels(self, moment: Moment, then: Moment, size: tuple[int, int]) -> Labels:
-        """At the centres of the pixels of a picture of that (width, height)."""
+        """At the centres of the pixels of an image of that (width, height)."""
         self._upload(self._positions, moment)
         self._upload(self._next, then)
         camera, camera_then = moment.camera.resized(*size), then.camera.resized(*size)

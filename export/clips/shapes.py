@@ -2,9 +2,9 @@
 
 All chance is in the turns, so that the entropy of each frame given those before it is known exactly: likelihoods that a
 network gives can be held against it. At each step a shape turns with probability `TURN` into one of eight directions,
-drawn evenly; else it keeps its own. A direction that would leave the picture is reflected, and choices that end in the
+drawn evenly; else it keeps its own. A direction that would leave the image is reflected, and choices that end in the
 same state count as one. Smaller shapes lie in front, and radii are such that none is ever hidden whole, so positions
-can always be told from the picture, and velocities from two.
+can always be told from the image, and velocities from two.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ State = tuple[int, int, int, int]  # position x, y and direction x, y
 
 
 def moved(state: State, direction: tuple[int, int], shape: _Shape) -> State:
-    """One step in that direction, each axis reflected where it would leave the picture."""
+    """One step in that direction, each axis reflected where it would leave the image."""
     out = []
     for at, step in zip(state[:2], direction, strict=True):
         if not shape.radius <= at + step * shape.speed <= SIDE_PX - 1 - shape.radius:

@@ -25,7 +25,7 @@ def row_of(clip: Clip) -> np.ndarray:
     """uint8 [192, 5 * 192, 3] RGB; the small frames, enlarged."""
     frames = clip.small
     count = len(frames.rgb)
-    # Where most moves: a motion picture of a moment of rest shows nothing.
+    # Where most moves: a motion image of a moment of rest shows nothing.
     t = int(np.hypot(*np.moveaxis(frames.motion, -1, 0)).mean((1, 2)).argmax())
     rebuilt = fetched_from_next(frames.rgb[t + 1], frames.motion[t])
     rebuilt = np.where(frames.visible[t][..., None], rebuilt, np.array([255, 0, 255], np.uint8))

@@ -1,4 +1,4 @@
-"""Pictures with and without people, random views of them, and the boxes that the network proposes there: what
+"""Images with and without people, random views of them, and the boxes that the network proposes there: what
 `export.densepose.train_evidence` learns from."""
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from export.shards import load_records, visible_boxes
 
 SIZES = (256, 288, 320, 384)
 TOWARDS_PERSON, PERSON_SCALE = 0.6, (0.2, 1.2)  # as in export.densepose.data.Cropping
-SHOWN = (0.55, 1.1)  # of other views: their side in long sides of the picture
+SHOWN = (0.55, 1.1)  # of other views: their side in long sides of the image
 MIN_SHOWN, MIN_SIDE_PX = 0.3, 12  # of a person's box; who has less in a view counts neither way
 SURE_SCORE = 0.5  # of the teacher's detector
 PROPOSALS = 50  # of a view, as many as at inference; each once more as the first pass moves it
@@ -33,7 +33,7 @@ IGNORED = 0.5  # fraction of a background box that may lie on a person whom no l
 
 @dataclass(frozen=True)
 class Picture:
-    """image: an encoded picture; box: float32 [n, 4] of its people, pixels; ignore: bool [n], unsure ones.
+    """image: an encoded image; box: float32 [n, 4] of its people, pixels; ignore: bool [n], unsure ones.
     complete: whether there are no other people; the teachers overlook some."""
 
     image: bytes
@@ -68,7 +68,7 @@ def from_photos(photos: Path, labels: Path) -> list[Picture]:
 
 
 def _photos(folder: Path) -> Iterator[tuple[Path, bytes]]:
-    """Raises ValueError where the folder has none, or a file is no picture."""
+    """Raises ValueError where the folder has none, or a file is no image."""
     paths = sorted(folder.glob("*.jpg"))
     if not paths:
         raise ValueError(f"no photographs (*.jpg) in {folder}")
@@ -86,7 +86,7 @@ def without_people(folder: Path) -> list[Picture]:
 
 
 def view_of(picture: Picture, size: int, rng: np.random.Generator) -> tuple[np.ndarray, People]:
-    """A random square of the picture, mirrored half of the time, with other colours: BGR [size, size, 3]."""
+    """A random square of the image, mirrored half of the time, with other colours: BGR [size, size, 3]."""
     image = cv2.imdecode(np.frombuffer(picture.image, np.uint8), cv2.IMREAD_COLOR)
     box, middle = picture.box.astype(np.float64), None
     if len(box) and rng.random() < TOWARDS_PERSON:
@@ -125,7 +125,7 @@ def proposed_boxes(
     net: MobileParsingRCNN, features: list[Tensor], objectness: list[Tensor], deltas: list[Tensor],
     size: tuple[int, int],
 ) -> Tensor:  # fmt: skip
-    """The RPN's proposals in a picture of `size` (height, width), and where the first pass of the box head moves them:
+    """The RPN's proposals in an image of `size` (height, width), and where the first pass of the box head moves them:
     [R, 4], pixels."""
     config = net.config
     flat = [bx.flat_outputs(o, d) for o, d in zip(objectness, deltas, strict=True)]
@@ -159,7 +159,7 @@ def matched(candidates: Tensor, truth: People) -> tuple[Tensor, Tensor, Tensor]:
 def drawn_views(
     kinds: list[tuple[list[Picture], float]], count: int, seed: int
 ) -> Iterator[tuple[Picture, Tensor, People]]:
-    """`count` pictures, each with a view of it, normalised [1, 3, h, w], and the people there. kinds: pictures and how
+    """`count` images, each with a view of it, normalised [1, 3, h, w], and the people there. kinds: images and how
     often they are drawn (fractions of 1)."""
     rng = np.random.default_rng(seed)
     fractions = np.array([fraction if pictures else 0.0 for pictures, fraction in kinds])
@@ -182,7 +182,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def read_kinds(options: argparse.Namespace) -> list[tuple[list[Picture], float]]:
-    """The pictures of --kind and how often they are drawn. Raises OSError or ValueError, a sentence, for what cannot be
+    """The images of --kind and how often they are drawn. Raises OSError or ValueError, a sentence, for what cannot be
     read."""
     readers = {
         "shards": from_shards,

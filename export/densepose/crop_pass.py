@@ -1,7 +1,7 @@
 """The second pass over one person: a crop turned upright (`export.densepose.person_crop`), through the trunk up to P2
-and the dense head, and its labels mapped back into the picture.
+and the dense head, and its labels mapped back into the image.
 
-The Python reference of what an application may run for people who are small or lean in the whole picture.
+The Python reference of what an application may run for people who are small or lean in the whole image.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TORSO, HEAD = (1, 2), (23, 24)
 
 
 def axis_of_surface(label: np.ndarray) -> np.ndarray | None:
-    """The direction of the body axis in the picture, from hips to head, of labels uint8 [H, W, 3] = (I, U*255, V*255).
+    """The direction of the body axis in the image, from hips to head, of labels uint8 [H, W, 3] = (I, U*255, V*255).
 
     The sum of two unit vectors: against the slope of U, which falls towards the neck, and from torso to head. Returns
     its direction, float64 [2]; None where too little of the torso is labelled.

@@ -1,4 +1,4 @@
-"""Inference outside the graphs: resize, proposals, NMS, RoIAlign, and composing the IUV picture.
+"""Inference outside the graphs: resize, proposals, NMS, RoIAlign, and composing the IUV image.
 
 Written against three callables, so that the torch network and ONNX Runtime sessions run the same code. It is
 the reference that the C++ runtime is compared with.

@@ -200,7 +200,7 @@ def parity(
     """Largest |ONNX - torch| of each output over the images, relative to the output's largest value.
 
     images: RGB uint8 [H, W, 3]. Every graph gets the torch network's own features; the heads those of its proposals.
-    `dense_head.u` and `.v` are what chart weights and `surface` give. The crop pass gets the pictures, too.
+    `dense_head.u` and `.v` are what chart weights and `surface` give. The crop pass gets the images, too.
     """
     net, crop_net = (copy.deepcopy(x).cpu().eval() if x is not None else None for x in (net, crop_net))
     modules = graph_modules(net, crop_net)

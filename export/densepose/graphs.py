@@ -30,7 +30,7 @@ def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
 class Bundle:
     """A bundle's graphs as callables, and the settings that its manifest names.
 
-    crop_graphs: of the crop pass; None where those of the whole picture do that, too.
+    crop_graphs: of the crop pass; None where those of the whole image do that, too.
     """
 
     folder: Path
@@ -85,7 +85,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         return dense_head
 
     def finest(crops: Tensor) -> Tensor:
-        # Exported for one picture, as the trunk is.
+        # Exported for one image, as the trunk is.
         return torch.cat([run("crop_trunk", crop[None])[0].permute(0, 3, 1, 2) for crop in crops])
 
     graphs = Graphs(detector, box_head, dense_head_of("dense_head", manifest["charts"]["file"]))

@@ -139,7 +139,7 @@ def _surface_terms(
     net: MobileParsingRCNN, features: list[Tensor], dense: list[tuple[Tensor, Tensor]], truths: list[tg.Truth],
     autocast: torch.autocast, pixel_head: PixelHead | None,
 ) -> dict[str, Tensor]:  # fmt: skip
-    """dense: of each picture the boxes for the dense head and the numbers of their people; features: from P2 on."""
+    """dense: of each image the boxes for the dense head and the numbers of their people; features: from P2 on."""
     config, terms = net.config, {}
     if any(len(d[0]) for d in dense):
         pooled = tg.pooled(features, [d[0] for d in dense], config, config.dense_pool, level=0)
@@ -157,7 +157,7 @@ def _surface_terms(
 def _detection(
     net: MobileParsingRCNN, image: Tensor, truths: list[tg.Truth], autocast: torch.autocast
 ) -> tuple[list[Tensor], list[Tensor], dict[str, Tensor]]:
-    """Features P2.., each picture's proposals [K, 4], and the terms of RPN and box head."""
+    """Features P2.., each image's proposals [K, 4], and the terms of RPN and box head."""
     config, size = net.config, image.shape[-2:]
     with autocast:
         features, objectness, deltas = net.detector(image)

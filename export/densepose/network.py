@@ -294,7 +294,7 @@ class RpnHead(nn.Module):
 class BoxHead(nn.Module):
     """[R, C, 7, 7] -> class logits [R, 2] (person, background) and box deltas [R, 4].
 
-    axis: whether `with_axis` is there, which also gives the direction from hips to head in the picture, [R, 2]: (1, 0)
+    axis: whether `with_axis` is there, which also gives the direction from hips to head in the image, [R, 2]: (1, 0)
     is to the right, (0, 1) down; near (0, 0) where it cannot be told.
     """
 

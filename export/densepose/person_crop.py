@@ -1,7 +1,7 @@
-"""Person crops: one person cut out of the source picture, turned upright, at one size.
+"""Person crops: one person cut out of the source image, turned upright, at one size.
 
 The trunk's finest map and the dense head go over such a crop in a second pass, for people who are small, tilted or
-crowded in the whole picture. Coordinates are continuous: pixel (x, y) covers [x, x + 1) x [y, y + 1).
+crowded in the whole image. Coordinates are continuous: pixel (x, y) covers [x, x + 1) x [y, y + 1).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ UPRIGHT = np.array([0.0, -1.0])
 
 @dataclass(frozen=True)
 class PersonCrop:
-    """A square crop. into: float64 [2, 3], from the picture to the crop; box: float64 [4], the person in the crop."""
+    """A square crop. into: float64 [2, 3], from the image to the crop; box: float64 [4], the person in the crop."""
 
     into: np.ndarray
     box: np.ndarray
@@ -25,18 +25,18 @@ class PersonCrop:
 
     @property
     def back(self) -> np.ndarray:
-        """float64 [2, 3], from the crop to the picture."""
+        """float64 [2, 3], from the crop to the image."""
         return cv2.invertAffineTransform(self.into)
 
 
 def turn_upright(axis: np.ndarray) -> np.ndarray:
-    """The rotation [2, 2] that takes the direction `axis` [2] in the picture to upright."""
+    """The rotation [2, 2] that takes the direction `axis` [2] in the image to upright."""
     x, y = np.asarray(axis, np.float64) / np.linalg.norm(axis)
     return np.array([[-y, x], [-x, -y]])
 
 
 def rotation(degrees: float) -> np.ndarray:
-    """[2, 2]; a positive angle turns what the picture shows clockwise."""
+    """[2, 2]; a positive angle turns what the image shows clockwise."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[c, -s], [s, c]])
 
@@ -51,7 +51,7 @@ def outline(mask: np.ndarray) -> np.ndarray:
 
 
 def turned_box(points: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Box float64 [4] around `points` [K, 2] after the rotation `turn` about the picture's origin."""
+    """Box float64 [4] around `points` [K, 2] after the rotation `turn` about the image's origin."""
     turned = points @ turn.T
     return np.concatenate([turned.min(0), turned.max(0)])
 
@@ -73,7 +73,7 @@ def _between_centres(into: np.ndarray) -> np.ndarray:
 
 
 def cut(image: np.ndarray, crop: PersonCrop, fill: tuple[float, ...]) -> np.ndarray:
-    """The crop of an image uint8 [H, W, C]; `fill` where the picture has ended. Shrunk pixels are averaged."""
+    """The crop of an image uint8 [H, W, C]; `fill` where the image has ended. Shrunk pixels are averaged."""
     into, size = crop.into, (crop.side_px, crop.side_px)
     scale = float(np.hypot(*into[:, 0]))
     if scale < 0.8:
@@ -90,6 +90,6 @@ def cut(image: np.ndarray, crop: PersonCrop, fill: tuple[float, ...]) -> np.ndar
 
 
 def cut_label(label: np.ndarray, crop: PersonCrop) -> np.ndarray:
-    """The crop of labels uint8 [H, W, C], not mixed; 0 where the picture has ended."""
+    """The crop of labels uint8 [H, W, C], not mixed; 0 where the image has ended."""
     size = (crop.side_px, crop.side_px)
     return cv2.warpAffine(label, _between_centres(crop.into), size, flags=cv2.INTER_NEAREST)

@@ -7,7 +7,7 @@ for N GPUs. On a CPU one process a core with `--batch 8` is about four times as 
 cores. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C, and draws the curves to
 `curves.png`.
 
-`--recipe both` trains on whole pictures and on person crops: each step has `--batch` pictures and `--crops` crops of
+`--recipe both` trains on whole images and on person crops: each step has `--batch` images and `--crops` crops of
 one person, upright and at one size, as a second pass over each person sees them. With `--decay` the rate stands until
 the last part of the run; the state before it is kept in `steady.pt`, and the same command with more `--minutes` or
 `--steps` goes on from there.
@@ -83,8 +83,8 @@ class TrainingConfig:
 
 @dataclass(frozen=True)
 class Stage:
-    """From `start` (fraction of the run) on: square crops of pictures, each batch at one of `sizes` pixels (none: no
-    pictures). `surface_only`: PixelHead's terms alone; `crops`: also person crops."""
+    """From `start` (fraction of the run) on: square crops of images, each batch at one of `sizes` pixels (none: no
+    images). `surface_only`: PixelHead's terms alone; `crops`: also person crops."""
 
     start: float
     sizes: tuple[int, ...]
@@ -104,7 +104,7 @@ RECIPES = {
     "usual": (Stage(0.0, (288, 320, 384), data.USUAL_CROPPING, crops=True),),
 }  # fmt: skip
 HELD_OUT_IMAGES = 100
-CROP_SEED = 500_000  # apart from the pictures' seed
+CROP_SEED = 500_000  # apart from the images' seed
 SURFACE_SIZE = 128  # of the crops that PixelHead is validated on
 MAX_GRADIENT_NORM = 10.0
 FIGURES = (
@@ -228,7 +228,7 @@ class Run:
         write_log(self.log, self.config.out, FIGURES, against="images", label="validation")
 
     def check(self, held_out: list[Record], stage: Stage) -> None:
-        """Adds figures on validation images to the log; boxes only where the stage has trained them."""
+        """Adds metrics on validation images to the log; boxes only where the stage has trained them."""
         cropping = data.CLOSE_CROPPING
         figures = validate_surface(self.averaged, self.averaged_pixel_head, held_out, SURFACE_SIZE, cropping)
         if stage.sizes and not stage.surface_only:
@@ -371,7 +371,7 @@ def parsed() -> TrainingConfig:
     parser.add_argument(
         "--recipe", choices=RECIPES, default=default.recipe,
         help="scratch: surface, then the whole network; crops: person crops alone; both: them and whole "
-             "pictures of 320 to 448 pixels; usual: the same at 288 to 384 pixels, with people as photographs show "
+             "images of 320 to 448 pixels; usual: the same at 288 to 384 pixels, with people as photographs show "
              "them (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--crops", type=int, default=default.crops, help="person crops a step and process")

@@ -6,9 +6,9 @@
 
 It reads the backbone's maps, which stay as they are, as do boxes and surface: the only thing that changes is the score
 of a box. So it comes last, after every training that changes the backbone. The maps and boxes of each of `--views`
-augmented pictures are kept in half precision; a step then costs three 1x1 convolutions.
+augmented images are kept in half precision; a step then costs three 1x1 convolutions.
 
-In pictures without people, every box is background. In all others scores are to stay as they are at the start
+In images without people, every box is background. In all others scores are to stay as they are at the start
 (distillation); only boxes on people whom labels are sure of are to have at least SURE.
 """
 

@@ -1,4 +1,4 @@
-"""Quick figures on validation images while training; `export.evaluation` has the full ones."""
+"""Quick metrics on validation images while training; `export.evaluation` has the full ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from export.surface import LIMB_SIDE
 
 @torch.no_grad()
 def validate(net: MobileParsingRCNN, records: list[Record]) -> dict[str, float]:
-    """Quick figures on validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
+    """Quick metrics on validation images: box recall and precision at IoU 0.5, part accuracy, mask IoU."""
     device = next(net.parameters()).device
     net = copy.deepcopy(net).cpu().eval() if device.type != "cpu" else net.eval()
     people = found = boxes = pixels = right = both = either = 0

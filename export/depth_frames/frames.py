@@ -1,6 +1,6 @@
 """A real depth frame, and how it becomes a whole view of `export.solids.records`.
 
-The distance to the nearest edge is not known in a real frame. Where surfaces are known to be smooth (round figures, a
+The distance to the nearest edge is not known in a real frame. Where surfaces are known to be smooth (round metrics, a
 flat board) the label is "no edge within 16 r", elsewhere there is none.
 """
 
@@ -17,7 +17,7 @@ from export.solids.records import LIMIT_R, NO_PATCH, NONE, Record, packed
 
 @dataclass(frozen=True, eq=False)
 class DepthFrame:
-    """depth: float32 [H, W] in metres (of pictures without a known scale: any unit), 0 where unknown. intrinsics: fx,
+    """depth: float32 [H, W] in metres (of images without a known scale: any unit), 0 where unknown. intrinsics: fx,
     fy, cx, cy in pixels. smooth: bool [H, W], where it is known that no edge is within 16 r. boxes: true sizes."""
 
     name: str

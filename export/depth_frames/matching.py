@@ -1,4 +1,4 @@
-"""From two pictures to depth: rectified by what is known of the cameras, matched by OpenCV's SGBM."""
+"""From two images to depth: rectified by what is known of the cameras, matched by OpenCV's SGBM."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _RATIO = 0.75  # of the best to the second best match of a feature (Lowe 2004)
 
 
 class MatchingError(RuntimeError):
-    """Two pictures could not be brought together; the sentence says why."""
+    """Two images could not be brought together; the sentence says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def calibrated(
     corners: tuple[list[np.ndarray], list[np.ndarray]], board: np.ndarray, size_px: tuple[int, int]
 ) -> tuple[np.ndarray, ...]:
     """Cameras and lenses of two cameras, rotation and shift between them, from corners [n, 2] of one board [n, 3] in
-    several pictures."""
+    several images."""
     places = [board.astype(np.float32)] * len(corners[0])
     cameras = [cv2.calibrateCamera(places, own, size_px, None, None)[1:3] for own in corners]
     error, *found = cv2.stereoCalibrate(
@@ -65,7 +65,7 @@ def calibrated(
 
 
 def rectified(left: np.ndarray, right: np.ndarray, cameras: tuple[np.ndarray, ...]) -> Rectified:
-    """Grey pictures of cameras (as `calibrated` gives them) with rows that belong together."""
+    """Grey images of cameras (as `calibrated` gives them) with rows that belong together."""
     size_px = left.shape[1], left.shape[0]
     a, lens_a, b, lens_b, rotation, shift = cameras
     turn_a, turn_b, place_a, place_b, *_ = cv2.stereoRectify(
@@ -84,7 +84,7 @@ def rectified(left: np.ndarray, right: np.ndarray, cameras: tuple[np.ndarray, ..
 
 
 def uncalibrated(left: np.ndarray, right: np.ndarray, focal_px: float) -> Rectified:
-    """Grey pictures of one camera of known focal length, moved by an unknown step, which becomes the unit of depth.
+    """Grey images of one camera of known focal length, moved by an unknown step, which becomes the unit of depth.
     Raises MatchingError."""
     height, width = left.shape
     camera = np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]])

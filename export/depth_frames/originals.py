@@ -1,4 +1,4 @@
-"""Real frames out of packages: stereo pairs, and scans of round figures seen from where they were scanned."""
+"""Real frames out of packages: stereo pairs, and scans of round metrics seen from where they were scanned."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def _away_from_borders(depth: np.ndarray) -> np.ndarray:
 def _read_walls(reader: PackageReader) -> Iterator[DepthFrame]:
     left, right = (_grey(reader, f"mvtbdata/images/walls-{s}.png") for s in ("l", "r"))
     left, right = (cv2.resize(p, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) for p in (left, right))
-    # A phone of 4.15 mm and pixels of 1.5 micrometres, by the book that the pictures belong to.
+    # A phone of 4.15 mm and pixels of 1.5 micrometres, by the book that the images belong to.
     pair = uncalibrated(left, right, 4.15e-3 / 1.5e-6 / 4)
     depth = depth_of(pair, 160)
     yield DepthFrame("real/walls", depth, pair.intrinsics, _nowhere(depth))

@@ -1,4 +1,4 @@
-"""How far a field is from the true one: the paper's figures, of one frame, then averaged over frames."""
+"""How far a field is from the true one: the paper's metrics, of one frame, then averaged over frames."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ class Run:
         write_log(self.log, self.config.out, FIGURES, against="step", label="validation, r")
 
     def check(self, frames: list) -> None:
-        """Adds figures on held-out frames, where there are some, to the log and writes sample.png."""
+        """Adds metrics on held-out frames, where there are some, to the log and writes sample.png."""
         if not frames:
             return
         figures = validate(self.mean.net, self.config.network.bins, frames, VALIDATED)

@@ -1,4 +1,4 @@
-"""Whole held-out frames through sensors and network: figures, and a sheet to look at."""
+"""Whole held-out frames through sensors and network: metrics, and a sheet to look at."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def figures_of(field: Field, frames: Sequence[Frame], level: str) -> list[dict[s
 def validate(
     network: EdgeNetwork, bins: int, frames: Sequence[Frame], levels: Sequence[str]
 ) -> dict[str, dict[str, float]]:
-    """Figures by level; distances are cut where the same frames say."""
+    """Metrics by level; distances are cut where the same frames say."""
     out = {}
     for level in levels:
         rows = figures_of(field_of(network, bins), frames, level)

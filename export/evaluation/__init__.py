@@ -1,1 +1,1 @@
-"""How well dense pose works: tables of figures on labelled images, pictures on real photographs."""
+"""How well dense pose works: tables of metrics on labelled images, images on real photographs."""

@@ -1,4 +1,4 @@
-"""Everything that can find people in an image, behind one call, so that the same figures are made for all.
+"""Everything that can find people in an image, behind one call, so that the same metrics are made for all.
 
 A backend is written `kind` or `kind=path`:
 
@@ -35,7 +35,7 @@ DEFAULT_PATHS = {
 @dataclass(frozen=True)
 class Prediction:
     """box: float32 [n, 4] x0, y0, x1, y1; score: float32 [n], best first. iuv: uint8 [H, W, 3] holding I,
-    U*255, V*255, all people in one picture, better scores in front. inds: uint8 [H, W], k for box k - 1, 0
+    U*255, V*255, all people in one image, better scores in front. inds: uint8 [H, W], k for box k - 1, 0
     for nobody.
     """
 

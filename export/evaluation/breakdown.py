@@ -1,4 +1,4 @@
-"""Figures by size, truncation, crowding and visible fraction of the person."""
+"""Metrics by size, truncation, crowding and visible fraction of the person."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Writes a bundle's model card from its manifest and from evaluation.json; every number in it comes from those two.
 
-The same text goes beside the bundle's manifest and into docs/; only the path to the gallery's picture differs. The
-manifest does not list the card: its figures are measured on the finished bundle.
+The same text goes beside the bundle's manifest and into docs/; only the path to the gallery's image differs. The
+manifest does not list the card: its metrics are measured on the finished bundle.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def card(manifest: dict, digest: str, document: dict, gallery: str) -> str:
-    """Markdown. digest: the bundle's `fingerprint`. document: evaluation.json. gallery: link to its picture.
+    """Markdown. digest: the bundle's `fingerprint`. document: evaluation.json. gallery: link to its image.
 
-    Raises ValueError when the document does not hold figures of this bundle.
+    Raises ValueError when the document does not hold metrics of this bundle.
     """
     figures = column_of(document, digest)
     sections = [

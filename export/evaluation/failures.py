@@ -1,4 +1,4 @@
-"""The worst cases, chosen by their figures."""
+"""The worst cases, chosen by their metrics."""
 
 from __future__ import annotations
 

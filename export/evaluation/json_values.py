@@ -1,4 +1,4 @@
-"""Figures as plain values for a JSON file."""
+"""Metrics as plain values for a JSON file."""
 
 from __future__ import annotations
 

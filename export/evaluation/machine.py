@@ -1,4 +1,4 @@
-"""The machine that figures were measured on, for their files."""
+"""The machine that metrics were measured on, for their files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs one backend over labelled images and turns what it says into figures."""
+"""Runs one backend over labelled images and turns what it says into metrics."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IMAGES_A_JOB = 50
 
 @dataclass(frozen=True)
 class Figures:
-    """One backend's figures. Shares are 0..1, errors in cm, times in seconds; NaN: nothing to measure.
+    """One backend's metrics. Shares are 0..1, errors in cm, times in seconds; NaN: nothing to measure.
 
     ap_box, ap_gps, ap_gpsm: mean over THRESHOLDS; *_by_threshold: at each. AP and calibration are over all scores, the
     others at `threshold`. pixel_fates: by the names of `surface_accuracy.FATES`. part_recall, part_precision,

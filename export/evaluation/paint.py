@@ -1,4 +1,4 @@
-"""Pictures of predictions: parts in colour over the photo, lines of equal U and V, boxes with scores."""
+"""Images of predictions: parts in colour over the photo, lines of equal U and V, boxes with scores."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _contours(iuv: np.ndarray, steps: int = 8) -> np.ndarray:
 
 
 def labelled_tile(picture: np.ndarray, text: str, width: int, height: int) -> np.ndarray:
-    """The picture fitted into width x height pixels with a line of text below it."""
+    """The image fitted into width x height pixels with a line of text below it."""
     scale = min(width / picture.shape[1], (height - 16) / picture.shape[0])
     fitted = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     tile = np.zeros((height, width, 3), np.uint8)

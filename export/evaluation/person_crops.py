@@ -2,7 +2,7 @@
 
     python -m export.evaluation.person_crops --data .data/people-wide/val --crop-weights .data/runs/crops/weights.pt
 
-Each person found by the first pass (the whole picture) is labelled four times: by the first pass; from a crop turned
+Each person found by the first pass (the whole image) is labelled four times: by the first pass; from a crop turned
 upright by the axis read off the first pass's surface; by the axis of the box head, where the weights have one; and by
 the true axis and outline, which is what better ones would give. Each is judged alone: which of two people is in front
 is left out, and so are missed people, which are counted.
@@ -31,7 +31,7 @@ from export.surface import LIMB_SIDE
 
 WAYS = ("whole picture", "crop, surface's axis", "crop, box head's axis", "crop, true axis")
 TILTS = ((0, 15), (15, 30), (30, 60), (60, 180))  # degrees from upright
-SIZES = ((0, 64), (64, 128), (128, 256), (256, 10_000))  # long side of the box, pixels of the picture
+SIZES = ((0, 64), (64, 128), (128, 256), (256, 10_000))  # long side of the box, pixels of the image
 MATCH_IOU = 0.5
 
 
@@ -68,7 +68,7 @@ def degrees_between(a: np.ndarray | None, b: np.ndarray) -> float:
 
 
 class CropJudge:
-    """Labels the people of a picture in all `WAYS` and keeps their scores by group. crop_net: for the second pass."""
+    """Labels the people of an image in all `WAYS` and keeps their scores by group. crop_net: for the second pass."""
 
     def __init__(
         self, net: MobileParsingRCNN, crop_net: MobileParsingRCNN, crop_size: int, config: DecodeConfig
@@ -127,7 +127,7 @@ class CropJudge:
                 self.scores[group][way].append(value)
 
     def table(self) -> dict[str, dict[str, dict[str, float]]]:
-        """Figures by group and way."""
+        """Metrics by group and way."""
         return {
             group: {way: figures(ways[way]) for way in WAYS if way in ways}
             for group, ways in sorted(self.scores.items(), key=lambda item: GROUPS.index(item[0]))

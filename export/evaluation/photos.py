@@ -1,4 +1,4 @@
-"""Figures on real photographs, against what permissively licensed teachers say about them (export.teachers).
+"""Metrics on real photographs, against what permissively licensed teachers say about them (export.teachers).
 
 python -m export.evaluation.photos --help
 """

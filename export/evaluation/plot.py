@@ -1,4 +1,4 @@
-"""The evaluation's results as one picture."""
+"""The evaluation's results as one image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How figures grew with training: one entry for each set of weights, kept in docs/research/progress.json and drawn.
+"""How metrics grew with training: one entry for each set of weights, kept in docs/research/progress.json and drawn.
 
     python -m export.evaluation --backends torch=WEIGHTS
     python -m export.evaluation.progress --add photographs --hours 6.9 --images 420000
@@ -52,7 +52,7 @@ def entry(name: str, hours: float, images: int, document: dict) -> dict:
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Figures against hours of training; dashed lines are what the product wants."""
+    """Metrics against hours of training; dashed lines are what the product wants."""
     rows = sorted(rows, key=lambda row: row["hours"])
     figure, (*axes, centimetres) = pyplot.subplots(1, 3, figsize=(16, 5), layout="constrained")
     for axis, key, table, title in zip(
@@ -85,7 +85,7 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.evaluation.progress", description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("--add", metavar="NAME", help="take the figures of --evaluation in, under this name")
+    parser.add_argument("--add", metavar="NAME", help="take the metrics of --evaluation in, under this name")
     parser.add_argument("--hours", type=float, help="of training so far, runs that these weights descend from included")
     parser.add_argument("--images", type=int, help="images seen so far")
     parser.add_argument("--evaluation", type=Path, default=Path("build/evaluation/evaluation.json"), metavar="JSON")

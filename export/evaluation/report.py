@@ -50,7 +50,7 @@ def column_name(kind: str, precision: str) -> str:
 
 
 def print_table(results: dict[str, Figures], console: Console | None = None) -> None:
-    """results: figures by column name; the first column is what the others are compared with."""
+    """results: metrics by column name; the first column is what the others are compared with."""
     console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
     first = next(iter(results.values()))
     console.print(
@@ -92,7 +92,7 @@ def largest_difference(results: dict[str, Figures]) -> float:
 
 
 def print_groups(title: str, groups: list[GroupFigures], console: Console | None = None) -> None:
-    """Figures by size, truncation, crowding and visibility."""
+    """Metrics by size, truncation, crowding and visibility."""
     console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
     table = Table(title=title, title_justify="left")
     table.add_column("")
@@ -139,7 +139,7 @@ def write_json(
 
 
 def column_of(document: dict, digest: str) -> dict:
-    """The figures in a file of `write_json` that belong to the model with this fingerprint.
+    """The metrics in a file of `write_json` that belong to the model with this fingerprint.
 
     Raises ValueError for files of another schema and when that model was not measured.
     """

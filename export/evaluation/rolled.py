@@ -15,7 +15,7 @@ from export.shards import LabelledImage, visible_boxes
 def rolled(image: LabelledImage, degrees: float) -> LabelledImage:
     """The image turned clockwise about its middle, on a square as wide as its diagonal, so that nothing is cut off.
 
-    At 0 degrees it is the same picture on the same square: what another angle is to be compared with. Boxes are those
+    At 0 degrees it is the same image on the same square: what another angle is to be compared with. Boxes are those
     of the turned outlines; people whom the turn leaves without a pixel are gone.
     """
     height, width = image.label.shape[:2]

@@ -31,14 +31,14 @@ from export.teachers.label import PhotoLabels
 
 PACKAGE = "pose2sim"
 CALIBRATION = "Pose2Sim/Demo_SinglePerson/calibration/Calib.qca.txt"
-SAMPLES = 1500  # pixels of a picture
+SAMPLES = 1500  # pixels of an image
 MAX_UV_DISTANCE = 0.03  # between pixels that count as one point, of U and V in 0..1
 MIN_PIXELS = 300  # of a person
 
 
 @dataclass(frozen=True)
 class CalibratedCamera:
-    """intrinsics [3, 3] and distortion (k1, k2, p1, p2) of pictures of size_px (width, height); rotation [3, 3] and
+    """intrinsics [3, 3] and distortion (k1, k2, p1, p2) of images of size_px (width, height); rotation [3, 3] and
     shift [3], metres, from the world to the camera (x right, y down, z forward)."""
 
     intrinsics: np.ndarray
@@ -48,7 +48,7 @@ class CalibratedCamera:
     shift: np.ndarray
 
     def rays(self, pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-        """Undistorted x / z, y / z [N, 2] of the centres of `pixels` [N, 2] of a picture of shape (height, width)."""
+        """Undistorted x / z, y / z [N, 2] of the centres of `pixels` [N, 2] of an image of shape (height, width)."""
         if not len(pixels):
             return np.zeros((0, 2))
         scale = np.array(self.size_px) / shape[::-1]
@@ -133,7 +133,7 @@ def equal_points(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> tupl
 @dataclass(frozen=True)
 class ViewFigures:
     """median_px: of equal points; random_px: of pixels paired at random within their part; gain: 1 - their ratio;
-    pairs: of pictures; matched: fraction of the asked pixels with a partner."""
+    pairs: of images; matched: fraction of the asked pixels with a partner."""
 
     median_px: float
     random_px: float

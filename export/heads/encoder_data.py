@@ -63,7 +63,7 @@ class Backgrounds:
 @dataclass(frozen=True)
 class Placing:
     """A crop's place in a picture: linear [2, 2] and the whole map [2, 3] from pixels of the crop to pixels of the
-    picture, and whether it is mirrored."""
+    image, and whether it is mirrored."""
 
     linear: np.ndarray
     to_picture: np.ndarray
@@ -71,12 +71,12 @@ class Placing:
 
     @property
     def zoom(self) -> float:
-        """Pixels of the picture by one of the crop."""
+        """Pixels of the image by one of the crop."""
         return float(np.linalg.norm(self.linear[:, 0]))
 
     def cut(self, picture: np.ndarray, border: int = cv2.BORDER_CONSTANT, value: tuple = ()) -> np.ndarray:
         """float32 [192, 192, C] of a picture [H, W, C]: bilinear, of pixels averaged before where it shrinks. border,
-        value: what is beyond the picture, as of cv2.warpAffine."""
+        value: what is beyond the image, as of cv2.warpAffine."""
         to_picture = self.to_picture
         if self.zoom > MAX_BILINEAR_ZOOM:
             height, width = picture.shape[:2]
@@ -94,7 +94,7 @@ class Placing:
 
 
 def placing(rng: np.random.Generator, augment: bool, side: int, face: np.ndarray | None = None) -> Placing:
-    """A crop of a square picture with sides of `side` pixels: of the whole head, or of the face, whose box (left, top,
+    """A crop of a square image with sides of `side` pixels: of the whole head, or of the face, whose box (left, top,
     right, bottom) is given."""
     u = rng.uniform
     if face is None:
@@ -126,7 +126,7 @@ def face_box(template: np.ndarray, known: np.ndarray) -> np.ndarray | None:
 
 
 def face_box_of(pictures: HeadPictures, k: int) -> np.ndarray | None:
-    """`face_box` of picture k, in its pixels."""
+    """`face_box` of image k, in its pixels."""
     step = 2
     template = pictures.template[k][::step, ::step] / np.float32(POINT_SCALE)
     masks = pictures.masks[k][:: LABEL_STEP * step, :: LABEL_STEP * step]
@@ -142,7 +142,7 @@ def crop_of(
     augment: bool = True,
     of_face: bool = False,
 ) -> Crop:
-    """A training crop of picture k, of the whole head or, where it is seen, the face: other place, size and turn,
+    """A training crop of image k, of the whole head or, where it is seen, the face: other place, size and turn,
     mirrored half of the time, occluded now and then."""
     place = placing(rng, augment, pictures.rgb.shape[1], face_box_of(pictures, k) if of_face else None)
     masks = pictures.masks[k]
@@ -165,7 +165,7 @@ def crop_of(
     normal = pictures.normal[k][at[..., 1], at[..., 0]].astype(np.float32) / 127
     known = (pictures.normal[k][at[..., 1], at[..., 0]] != 0).any(-1) & inside
     cells = matte.reshape(CELLS, CELL_PX, CELLS, CELL_PX).mean((1, 3)) * known
-    normal[..., :2] = normal[..., :2] @ (place.linear / place.zoom)  # the crop's axes are turned against the picture's
+    normal[..., :2] = normal[..., :2] @ (place.linear / place.zoom)  # the crop's axes are turned against the image's
     if place.mirrored:
         template[..., 0] *= -1
     if augment:

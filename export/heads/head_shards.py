@@ -1,4 +1,4 @@
-"""Files of made heads, one a head: points for the prior (`points`) and pictures for the encoder (`view_shards`), read.
+"""Files of made heads, one a head: points for the prior (`points`) and images for the encoder (`view_shards`), read.
 
 Making them takes geometry packages; reading them takes numpy alone.
 """
@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 
 SPLITS = ("train", "val", "test")
-SIDE = 512  # of a picture, px
+SIDE = 512  # of an image, px
 LABEL_STEP = 2  # template points and normals are stored for every second pixel of every second row
 POINT_SCALE = 8000.0  # int16 a dm
 NOSE_TIP = np.array([0.0, -1.24, -0.35])  # of the template, dm
 FACE_RADIUS_DM = 0.95
 FACE_SIDES = 1.3  # side of the encoder's closer look by the longer side of the face's box
-CROP_SIDES = 1.6  # side of a picture by the longer side of the head's box; a training cuts smaller ones out of it
+CROP_SIDES = 1.6  # side of an image by the longer side of the head's box; a training cuts smaller ones out of it
 
 
 def is_face(template: np.ndarray) -> np.ndarray:
-    """Which points belong to the face, by their template points [..., 3]: what figures of faces are about."""
+    """Which points belong to the face, by their template points [..., 3]: what metrics of faces are about."""
     return np.linalg.norm(template - NOSE_TIP, axis=-1) < FACE_RADIUS_DM
 
 
@@ -45,7 +45,7 @@ class HeadPoints:
 
 @dataclass(frozen=True)
 class HeadPictures:
-    """K pictures of a head. rgb uint8 [K, 512, 512, 3]; masks uint8 [K, 512, 512]: 255 head, 128 bust, 0 nothing;
+    """K images of a head. rgb uint8 [K, 512, 512, 3]; masks uint8 [K, 512, 512]: 255 head, 128 bust, 0 nothing;
     template int16 [K, 256, 256, 3], dm times 8,000; normal int8 [K, 256, 256, 3], camera's axes, times 127;
     rotation [K, 3, 3] and shift [K, 3] from the head's frame (dm) to the camera's; intrinsics [K, 3]: focal, cx,
     cy, px."""

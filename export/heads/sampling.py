@@ -87,7 +87,7 @@ def look_at(
     yaw: float, pitch: float, roll: float, distance: float, aim: np.ndarray, focal_px: float, side_px: int
 ) -> Camera:
     """A camera at `distance` (dm) from `aim` (head frame): yaw 0 sees the face, positive from the person's left;
-    positive pitch from above (radians). Its picture is a square with `aim` in the middle."""
+    positive pitch from above (radians). Its image is a square with `aim` in the middle."""
     outward = np.array([np.sin(yaw) * np.cos(pitch), -np.cos(yaw) * np.cos(pitch), np.sin(pitch)])
     forward = -outward
     right = np.cross(forward, [0, 0, 1.0])
@@ -99,7 +99,7 @@ def look_at(
 
 
 def sample_camera(points: np.ndarray, rng: np.random.Generator) -> Camera:
-    """Mostly of faces from the front and sides, from 35 cm to 3 m; the picture is a square around a head's points."""
+    """Mostly of faces from the front and sides, from 35 cm to 3 m; the image is a square around a head's points."""
     u = rng.random()
     yaw = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
     pitch, roll = np.clip(rng.normal(0, 0.22), -0.8, 0.8), np.clip(rng.normal(0, 0.22), -0.9, 0.9)

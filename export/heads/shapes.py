@@ -73,7 +73,7 @@ class HeadShapes:
     """The body mesh cut to the head, and what moves it.
 
     vertices of a head: float64 [V, 3], head frame; `faces` [F, 3] of skin, `eye_faces` [E, 3] of the eyeballs (closed),
-    `uv` [F, 3, 2] in the skin texture. `bust_faces`, `bust_uv`: shoulders and chest, which pictures show below a head.
+    `uv` [F, 3, 2] in the skin texture. `bust_faces`, `bust_uv`: shoulders and chest, which images show below a head.
     `skull` [V]: all above the mouth, what holds a head in its frame.
     """
 

@@ -1,4 +1,4 @@
-"""Pictures of made heads for the encoder, one file a head: colour, masks, template points, normals, cameras.
+"""Images of made heads for the encoder, one file a head: colour, masks, template points, normals, cameras.
 
     python -m export.heads.view_shards train --count 600 --out .data/heads/views
 
@@ -20,7 +20,7 @@ from export.heads.views import HeadViews, Seen
 
 
 def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPictures:
-    """Draws `count` pictures of a head, each in other light."""
+    """Draws `count` images of a head, each in other light."""
     extras = sample_extras(rng)
     views = HeadViews(head, extras)
     rows: list[tuple] = []
@@ -33,7 +33,7 @@ def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPicture
 
 
 def picture_row(seen: Seen) -> tuple:
-    """The fields of `HeadPictures` of one picture."""
+    """The fields of `HeadPictures` of one image."""
     camera, step = seen.camera, slice(None, None, LABEL_STEP)
     masks = np.where(seen.mask, 255, np.where(seen.present, 128, 0)).astype(np.uint8)
     normal = (seen.normal[step, step] @ camera.rotation.T) * 127
@@ -46,7 +46,7 @@ def picture_row(seen: Seen) -> tuple:
 
 def main() -> None:
     parser = shard_parser(__doc__, Path(".data/heads/views"))
-    parser.add_argument("--views", type=int, default=16, help="pictures a head")
+    parser.add_argument("--views", type=int, default=16, help="images a head")
     arguments = parser.parse_args()
     write_shards(arguments, "views", lambda head, rng: pictures_of(head, arguments.views, rng))
 

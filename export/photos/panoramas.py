@@ -38,7 +38,7 @@ def build(folder: Path, force: bool = False) -> dict[str, int]:
 
 
 def decoded(script: bytes) -> np.ndarray:
-    """The picture that a JavaScript file holds as a data address of base64: float16 [H, W, 3].
+    """The image that a JavaScript file holds as a data address of base64: float16 [H, W, 3].
 
     Their lossy compression rings around lamps, down to negative light; that is cut off.
     """

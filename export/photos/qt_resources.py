@@ -1,4 +1,4 @@
-"""Files out of a Qt resource file (.rcc), in which programs of the Qt family keep their pictures and their credits.
+"""Files out of a Qt resource file (.rcc), in which programs of the Qt family keep their images and their credits.
 
 Layout (big-endian): "qres", version, then where tree, data and names begin. An entry of the tree is 14 bytes (22 from
 version 2 on, with a time behind): where its name begins and its flags, then for a folder how many children it has and

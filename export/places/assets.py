@@ -36,7 +36,7 @@ FURNITURE = Package(
 TILES = next(p for p in assets.PACKAGES if p.name == "0ad-data")
 MODEL_LIST = "BlendSwap-CC-0.sh3f"
 TILE_SIDE_PX = 512
-# Textures of the game that are no picture of a ground: normal and highlight maps, water, lava, plain colours for tests.
+# Textures of the game that are no image of a ground: normal and highlight maps, water, lava, plain colours for tests.
 _NO_GROUND = re.compile(r"_norm|_spec|lava|water|wave|foam|ocean|sea_|grid|neon|ness\.|corral|coral", re.IGNORECASE)
 SPLITS = {"train": 0, "val": 1, "test": 2}
 

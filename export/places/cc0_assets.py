@@ -1,6 +1,6 @@
 """A stock whose every part is CC0 or drawn here, for places that are given away: furniture, textures by code.
 
-Models are those of the split; what else a room needs (floors, pictures, the light around) is drawn from the same random
+Models are those of the split; what else a room needs (floors, images, the light around) is drawn from the same random
 numbers as the rest. No people.
 """
 

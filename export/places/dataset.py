@@ -1,4 +1,4 @@
-"""Renders places: pictures from many cameras, their depth, a point cloud.
+"""Renders places: images from many cameras, their depth, a point cloud.
 
     python -m export.places.dataset --split train --scenes 100 --processes 2 --out .data/places
 

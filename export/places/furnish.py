@@ -20,7 +20,7 @@ def about_z(radians: float) -> np.ndarray:
 
 
 def quad(centre, right, up, width: float, height: float) -> Solid:
-    """A rectangle with a picture's uv: `right` and `up` are unit vectors [3]."""
+    """A rectangle with an image's uv: `right` and `up` are unit vectors [3]."""
     right, up = np.asarray(right, float) * width / 2, np.asarray(up, float) * height / 2
     a, b, c, d = (np.asarray(centre, float) + x * right + y * up for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
     uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], float)

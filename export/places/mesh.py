@@ -206,7 +206,7 @@ def _figures(text: str) -> np.ndarray:
 def _material(entry: dict[str, str], folder: Path) -> Material:
     texture = None
     if "map_Kd" in entry:
-        # Some paths are those of the author's own disk: the picture lies beside the model all the same, or is missing.
+        # Some paths are those of the author's own disk: the image lies beside the model all the same, or is missing.
         file = folder / entry["map_Kd"].replace("\\", "/").split("/")[-1].strip()
         image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.exists() else None
         if image is not None:
@@ -219,7 +219,7 @@ def _material(entry: dict[str, str], folder: Path) -> Material:
                 texture = np.ascontiguousarray(texture[..., :3])
     colour = np.clip(_figures(entry.get("Kd", "0.8 0.8 0.8")), 0, 1)
     if texture is not None:
-        colour = np.ones(3)  # exporters leave any grey here, or black, beside a picture
+        colour = np.ones(3)  # exporters leave any grey here, or black, beside an image
     strength = float(np.clip(_figures(entry.get("Ks", "0 0 0")).mean(), 0, 1))
     shininess = float(np.clip(_figures(entry.get("Ns", "20"))[0], 2, 400))
     emission = float(np.clip(_figures(entry.get("Ke", "0 0 0")).max(), 0, 4))

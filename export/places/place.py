@@ -1,4 +1,4 @@
-"""Reads a place's folder (docs/reference/formats.md): cameras, pictures and depth when asked for, the cloud."""
+"""Reads a place's folder (docs/reference/formats.md): cameras, images and depth when asked for, the cloud."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _depth_reader(unit_m: float):
 def load_place(folder: Path | str) -> Place:
     """Reads a place; raises PlaceError with a sentence where a file is missing or not what it should be.
 
-    Pictures and depth are opened only when asked for, and may raise then.
+    Images and depth are opened only when asked for, and may raise then.
     """
     folder = Path(folder)
     file = folder / "transforms.json"

@@ -1,4 +1,4 @@
-"""From (split, seed) to a place with its cameras, and from there to pictures, depth and exposure."""
+"""From (split, seed) to a place with its cameras, and from there to images, depth and exposure."""
 
 from __future__ import annotations
 

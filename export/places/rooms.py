@@ -1,4 +1,4 @@
-"""A room: floor, walls, perhaps a ceiling, windows and pictures; furniture, things on it, people; cameras inside."""
+"""A room: floor, walls, perhaps a ceiling, windows and images; furniture, things on it, people; cameras inside."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ class RoomMaker:
         self.frame(photo, place[0], (place[1], max(z, height / 2 + 0.3)), (width, height), window)
 
     def frame(self, photo: np.ndarray, spot: tuple[int, int], middle, size, window: bool) -> None:
-        """A picture or a window of `size` (width, height) on a wall, its `middle` so far along the wall and so high."""
+        """An image or a window of `size` (width, height) on a wall, its `middle` so far along the wall and so high."""
         u, (along, z), (width, height) = self.rng.uniform, middle, size
         at, inward = self.on_wall(spot, along, z, 0.02)
         right, up = np.cross([0, 0, 1.0], inward), np.array([0, 0, 1.0])

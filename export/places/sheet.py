@@ -1,4 +1,4 @@
-"""A contact sheet of places, to be looked at: pictures, their depth, and the cloud as points from the same cameras.
+"""A contact sheet of places, to be looked at: images, their depth, and the cloud as points from the same cameras.
 
 python -m export.places.sheet .data/places/val/place-0000* --out sheet.png
 """
@@ -55,7 +55,7 @@ def _cell(image: np.ndarray) -> np.ndarray:
 
 
 def sheet_of(place: Place, columns: int = 6) -> np.ndarray:
-    """Rows of pictures, depth and cloud of some views, held-out ones among them: uint8 [H, W, 3]."""
+    """Rows of images, depth and cloud of some views, held-out ones among them: uint8 [H, W, 3]."""
     own = np.linspace(0, len(place.source) - 1, columns - columns // 3).astype(int)
     other = np.linspace(0, len(place.held_out) - 1, columns // 3).astype(int) if len(place.held_out) else []
     views = [*(int(place.source[k]) for k in own), *(int(place.held_out[k]) for k in other)]

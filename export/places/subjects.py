@@ -20,7 +20,7 @@ def outdoors(stock, rng: np.random.Generator, assets: list[Asset]) -> Lighting:
     radiance, asset = stock.panorama(rng)
     assets.append(asset)
     yaw = int(rng.integers(radiance.shape[1]))
-    # Columns run once around from +x; a turned place is the picture rolled.
+    # Columns run once around from +x; a turned place is the image rolled.
     panorama = Panorama(np.roll(radiance, yaw, 1))
     scale = panorama.exposure(u(0.7, 1.3))
     lamps = [(np.array([*towards, 0.0]), np.minimum(colour * scale, 4.0)) for towards, colour in panorama.lamps]

@@ -1,4 +1,4 @@
-"""Attention over all places of a frame, with a learnt bias for each step along rows and along columns."""
+"""Attention over all cells of a frame, with a learnt bias for each step along rows and along columns."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PLACES = CODE_SIDE * CODE_SIDE
 
 
 class AttentionLayer(nn.Module):
-    """Pre-norm attention and pre-norm two-layer network. masked: a place sees itself and those before, row by row."""
+    """Pre-norm attention and pre-norm two-layer network. masked: a cell sees itself and those before, row by row."""
 
     def __init__(self, shape: TransformerShape, masked: bool) -> None:
         super().__init__()

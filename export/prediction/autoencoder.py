@@ -1,6 +1,6 @@
-"""VQ-VAE of single frames: a frame of 64 x 64 to 16 x 16 places (or 8 x 8) of a few codes each, and back.
+"""VQ-VAE of single frames: a frame of 64 x 64 to 16 x 16 cells (or 8 x 8) of a few codes each, and back.
 
-Without norms, as in the paper: a code then depends on what lies near its place alone.
+Without norms, as in the paper: a code then depends on what lies near its cell alone.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def decoder(shape: AutoencoderShape) -> nn.Sequential:
 
 class Autoencoder(nn.Module):
     def __init__(self, shape: AutoencoderShape) -> None:
-        """Raises ValueError for another number of places than 16 or 8 in a row."""
+        """Raises ValueError for another number of cells than 16 or 8 in a row."""
         super().__init__()
         if shape.side not in (CODE_SIDE, CODE_SIDE // 2):
             raise ValueError(f"A frame has 16 or 8 places in a row, not {shape.side}.")

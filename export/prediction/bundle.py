@@ -17,7 +17,7 @@ from export.prediction.refiner.refiner_graph import MENDED
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
 TRAINED_FPS = (10, 30)  # of the clips that transformers were trained on
-CELL_PX = 4  # pixels of a place, both ways
+CELL_PX = 4  # pixels of a cell, both ways
 TRAINING_DATA = (
     sources.RENDERED_CLIPS.used_for("training, calibration"),
     sources.BACKGROUNDS.used_for("training of the autoencoder, collages"),

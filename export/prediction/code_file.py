@@ -26,7 +26,7 @@ class CodeFileError(ValueError):
 @dataclass(frozen=True, eq=False)
 class FrameCodes:
     """entries float32 [slices, K, width]: what codes stand for. frequency_bits [slices, K], after_bits [slices, K, K]
-    (of the code on the last axis after another): float32, as stored. side: places of a frame in a row."""
+    (of the code on the last axis after another): float32, as stored. side: cells of a frame in a row."""
 
     entries: np.ndarray
     frequency_bits: np.ndarray

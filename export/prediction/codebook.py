@@ -9,7 +9,7 @@ from torch.nn import functional as F
 
 DECAY = 0.99
 _EPSILON = 1e-5
-_DEAD = 0.03  # of the mean count: an entry used less than that is given a new place
+_DEAD = 0.03  # of the mean count: an entry used less than that gets a new value
 _REBORN = 0.06  # of the mean count: what an entry that was put elsewhere begins with, 70 steps from death
 _REBIRTH_STEPS = 20
 

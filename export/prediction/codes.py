@@ -3,7 +3,7 @@
     python -m export.prediction.codes --autoencoder .data/runs/prediction-autoencoder/weights.pt --sets pushing shapes
 
 Writes codes-train.npz and codes-val.npz to --out: `codes` int16 [N, T, slices, 16, 16]; `motion` int16 [N, T,
-horizons, slices, 16, 16], of the pictures that motion alone predicts (`motion_pictures.HORIZONS` frames after frame t),
+horizons, slices, 16, 16], of the images that motion alone predicts (`motion_images.HORIZONS` frames after frame t),
 -1 where there is none; `fps` [N], `names` [N]. Clips to train on are there mirrored as well. Needs the SDK's library,
 for motion.
 """
@@ -30,7 +30,7 @@ from export.prediction.table import CodeTable, bits_by_frequency, bits_by_table
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.transformer import UNSEEN
 
-_AT_ONCE = 512  # pictures
+_AT_ONCE = 512  # images
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ CODE_SIDE = 16  # codes a side of a frame of 64 x 64
 
 @dataclass(frozen=True)
 class AutoencoderShape:
-    """widths: channels at 32 x 32 and at 16 x 16; residual: channels within a residual block; slices: codes a place,
+    """widths: channels at 32 x 32 and at 16 x 16; residual: channels within a residual block; slices: codes a cell,
     each from a codebook of `entries`; depth_to_space: convolution and rearrangement for transposed convolutions; side:
-    places of a frame in a row, 16 or 8 (everything behind the autoencoder takes 16)."""
+    cells of a frame in a row, 16 or 8 (everything behind the autoencoder takes 16)."""
 
     widths: tuple[int, int] = (64, 128)
     residual: int = 64
@@ -26,7 +26,7 @@ class AutoencoderShape:
 class TransformerShape:
     """layers: of the context network; slice_layers: of the slice network, where they are not as many; embedding:
     channels of embedded codes; frames: how many before the predicted one are seen; motion: whether the codes of the
-    picture that motion alone predicts are seen as well; slices, entries: of the autoencoder."""
+    image that motion alone predicts are seen as well; slices, entries: of the autoencoder."""
 
     width: int = 192
     layers: int = 6

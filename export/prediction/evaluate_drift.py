@@ -5,9 +5,9 @@ validation clip, by a bundle's graphs.
     python -m export.prediction.evaluate_drift --frames 40 --temperatures 1
 
 Prints for stretches of frames, beside the clip's own: `bits` a code of what was drawn, by what the network said of it;
-`codes`: entropy of the codes of a frame, in bits (8 with all 256 places different); `contrast`: standard deviation of
-the picture, as a share of the last true frame's; `motion`: mean difference from the frame before, in grey levels. Each
-frame is drawn place after place, and its picture, made of its codes, is what motion goes by.
+`codes`: entropy of the codes of a frame, in bits (8 with all 256 cells different); `contrast`: standard deviation of
+the image, as a share of the last true frame's; `motion`: mean difference from the frame before, in grey levels. Each
+frame is drawn cell after cell, and its image, made of its codes, is what motion goes by.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Roll:
         self.frames += 1
 
     def go_on(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Codes and picture of the next frame, and its bits a code; it is then seen."""
+        """Codes and image of the next frame, and its bits a code; it is then seen."""
         before = list(self.seen)
         if self.tables.frames > self.tables.before:
             moved = self.predictor.predict(1 / self.fps).pixels()

@@ -5,7 +5,7 @@ the difference between frames and what is left of it after motion.
     python -m export.prediction.evaluate_events --transformer .data/runs/prediction-transformer/weights.pt
 
 A frame's level is how many times its score is above or below the median of the 8 before it: one threshold serves quiet
-and busy streams, and a picture that stands still all at once stands out, too.
+and busy streams, and an image that stands still all at once stands out, too.
 With an event: its first frame, and the following two of a freeze. Without: all frames of the same clips as they were.
 """
 

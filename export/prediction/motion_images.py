@@ -1,4 +1,4 @@
-"""Pictures that motion alone predicts, by the SDK's own method at the networks' size: what they see besides the frames
+"""Images that motion alone predicts, by the SDK's own method at the networks' size: what they see besides the frames
 before, and must beat."""
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ _STILL_SIDE = 384  # of photographs, the longer one; collages are made of them t
 
 
 def film(frames: np.ndarray, quality: int) -> bytes:
-    """uint8 [N, 64, 64, 3] -> H.264; each clip begins with a whole picture. quality: x264's constant rate factor."""
+    """uint8 [N, 64, 64, 3] -> H.264; each clip begins with a whole image. quality: x264's constant rate factor."""
     with tempfile.NamedTemporaryFile(suffix=".mp4") as file:
         command = (
             f"ffmpeg -y -loglevel error -f rawvideo -pix_fmt rgb24 -s {SIDE_PX}x{SIDE_PX} -r 30 -i - -c:v libx264 "

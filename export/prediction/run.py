@@ -101,7 +101,7 @@ def run(
 ) -> None:
     """Trains to the end of the schedule, or to a signal; writes checkpoint.pt, weights.pt, log.json and curves.png.
 
-    advance: a step at that learning rate -> terms of the loss; validate: -> figures to draw, with `label`.
+    advance: a step at that learning rate -> terms of the loss; validate: -> metrics to draw, with `label`.
     """
     folder: Path = arguments.out
     folder.mkdir(parents=True, exist_ok=True)

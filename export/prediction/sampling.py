@@ -1,4 +1,4 @@
-"""Draws the codes of a next frame. Recomputes everything for each place, so it is slow: for pictures in training."""
+"""Draws the codes of a next frame. Recomputes everything for each cell, so it is slow: for images in training."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How likely each code is after the one that its place had in the frame before, counted: what the transformer starts
+"""How likely each code is after the one that its cell had in the frame before, counted: what the transformer starts
 from and must beat."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _RETURNS = 0.02  # of that weight, to each of the two, so that either may come b
 @dataclass(frozen=True, eq=False)
 class CodeTable:
     """Natural logarithms of probabilities. frequency [slices, K]: of a code by itself; after [slices, K, K]: of a code
-    (last axis) after another one at its place."""
+    (last axis) after another one at its cell."""
 
     frequency: Tensor
     after: Tensor

@@ -3,7 +3,7 @@
     python -m export.prediction.train_autoencoder --sets pushing shapes --minutes 90
 
 Each frame is varied as by another camera, and its noise is to be left out of the rebuilt one. Writes checkpoint.pt,
-weights.pt, log.json, curves.png and sample.png (true frames above, rebuilt below) to --out. Figures are of held-out
+weights.pt, log.json, curves.png and sample.png (true frames above, rebuilt below) to --out. Metrics are of held-out
 clips: `psnr` of rebuilt frames, dB; `used` fraction of the codebooks' entries.
 """
 
@@ -70,9 +70,9 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/prediction-autoencoder"))
     parser.add_argument("--size", choices=AUTOENCODERS, default="light")
-    parser.add_argument("--slices", type=int, help="codes a place (default 4)")
+    parser.add_argument("--slices", type=int, help="codes a cell (default 4)")
     parser.add_argument("--entries", type=int, help="of each codebook (default 512)")
-    parser.add_argument("--side", type=int, choices=(8, 16), help="places of a frame in a row (default 16)")
+    parser.add_argument("--side", type=int, choices=(8, 16), help="cells of a frame in a row (default 16)")
     parser.add_argument(
         "--stills", type=Path, help="folder of photographs, a quarter of the frames (.data/backgrounds/train)"
     )

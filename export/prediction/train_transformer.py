@@ -4,8 +4,8 @@
     python -m export.prediction.train_transformer --minutes 480
 
 Writes checkpoint.pt, weights.pt, log.json and curves.png to --out, and with --autoencoder sample.png: rows of the last
-frame seen, the next by its true codes, the likeliest, and two drawn. Figures are bits a code on held-out clips:
-`transformer`, beside `table` (the code that the place had before) and `frequency`, on the same frames.
+frame seen, the next by its true codes, the likeliest, and two drawn. Metrics are bits a code on held-out clips:
+`transformer`, beside `table` (the code that the cell had before) and `frequency`, on the same frames.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from export.prediction.table import CodeTable, bits_by_frequency, bits_by_table
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.transformer import UNSEEN, LatentTransformer
 
-_NO_MOTION = 0.1  # of the examples are without the picture that motion predicts
+_NO_MOTION = 0.1  # of the examples are without the image that motion predicts
 _DISTURBED = 0.5  # of the examples have some codes before replaced, at most this fraction of them
 _REPLACED = 0.05
 
@@ -178,7 +178,7 @@ def parsed() -> argparse.Namespace:
         "--autoencoder", type=Path, help="its weights: draws sample.png at the end (256 passes a frame)"
     )
     parser.add_argument("--no-table", action="store_true", help="start from even probabilities, to compare")
-    parser.add_argument("--no-motion", action="store_true", help="without the picture that motion predicts, to compare")
+    parser.add_argument("--no-motion", action="store_true", help="without the image that motion predicts, to compare")
     parser.add_argument("--validate-frames", type=int, default=128, help="held-out frames (default %(default)s)")
     run.add_arguments(parser, minutes=480, batch=8, rate=5e-4)
     return parser.parse_args()

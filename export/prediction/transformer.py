@@ -1,8 +1,8 @@
 """The transformer over codes: a context network sees the frames before, a masked slice network the codes of the frame
-that were given already, and a chain of heads gives the slices of a place one after another.
+that were given already, and a chain of heads gives the slices of a cell one after another.
 
 Departures from the paper: taps in time that never see anything are left out; the time from frame to frame takes the
-place of the frame's number, which ends at 16; probabilities start from a table (`table.py`); the picture that motion
+place of the frame's number, which ends at 16; probabilities start from a table (`table.py`); the image that motion
 alone predicts is seen as one more frame.
 """
 
@@ -62,14 +62,14 @@ def sinusoids(width: int) -> Tensor:
 
 
 class SliceNetwork(nn.Module):
-    """Context and the codes of the frame at places before -> features of each place, which no later code reaches."""
+    """Context and the codes of the frame at cells before -> features of each cell, which no later code reaches."""
 
     def __init__(self, shape: TransformerShape) -> None:
         super().__init__()
         self.slices, self.entries = shape.slices, shape.entries
         self.rows = nn.Embedding(shape.slices * shape.entries, shape.embedding)
         nn.init.normal_(self.rows.weight, std=shape.slices**-0.5)
-        # Sees two rows above, three places wide, and the left neighbour.
+        # Sees two rows above, three cells wide, and the left neighbour.
         self.above = nn.Conv2d(shape.embedding, shape.width, (2, 3))
         self.left = nn.Conv2d(shape.embedding, shape.width, 1, bias=False)
         self.from_context = nn.Linear(shape.width, shape.width)
@@ -86,7 +86,7 @@ class SliceNetwork(nn.Module):
 
 
 class ChannelHeads(nn.Module):
-    """Features of a place, and the slices of it that are known -> logits of the next slice."""
+    """Features of a cell, and the slices of it that are known -> logits of the next slice."""
 
     def __init__(self, shape: TransformerShape) -> None:
         super().__init__()
@@ -117,7 +117,7 @@ class ChannelHeads(nn.Module):
 
 
 class LatentTransformer(nn.Module):
-    """table [slices, K + 1, K]: log-probabilities added to the logits, by the code that the place had before (K: none).
+    """table [slices, K + 1, K]: log-probabilities added to the logits, by the code that the cell had before (K: none).
     Zeros: no table."""
 
     def __init__(self, shape: TransformerShape) -> None:

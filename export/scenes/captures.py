@@ -3,7 +3,7 @@
 transforms.json is the file of nerfstudio and Instant-NGP: `w`, `h`, `fl_x`, `fl_y`, `cx`, `cy` for all frames or for
 each, and `frames`, each with `file_path` and `transform_matrix`, camera to world with x to the right, y up and z
 backwards. A principal point counts from the corner of the first pixel, so ours is half a pixel less. The cloud is the
-file named by `ply_file_path`, or cloud.ply. Frames in `test_filenames` are held out: pictures are made of the others.
+file named by `ply_file_path`, or cloud.ply. Frames in `test_filenames` are held out: images are made of the others.
 Up is `up`, or `up_axis` in the table `maquette` of rendered places (export/places), or y.
 """
 
@@ -33,7 +33,7 @@ class CaptureError(ValueError):
 @dataclass(frozen=True, eq=False)
 class Capture:
     """One place. photos: encoded, so that many fit into memory. up: of the world. held_out: indices of photos that
-    pictures are never made of. names: of the photos, relative to the folder. seen: kept by training
+    images are never made of. names: of the photos, relative to the folder. seen: kept by training
     (export.scenes.samples)."""
 
     name: str
@@ -46,7 +46,7 @@ class Capture:
     seen: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
 
     def sources(self) -> list[int]:
-        """Indices of the photos that pictures are made of."""
+        """Indices of the photos that images are made of."""
         return [k for k in range(len(self.cameras)) if k not in self.held_out]
 
     def view(self, k: int, long_side_px: int | None = None) -> View:

@@ -9,7 +9,7 @@ COLOURS = 3  # of them that are the photo's red, green, blue
 BASIS = 6  # functions of the direction that the descriptor is a combination of
 RASTER = FEATURES + 1  # with the occupancy
 LEVELS = 5  # rasters at 1, 1/2, 1/4, 1/8, 1/16
-MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered pictures, pixels
+MULTIPLE = 2 ** (LEVELS - 1)  # sides of rendered images, pixels
 DEPTH_TOLERANCE = 0.1  # a point so much farther than one beside it is occluded (export.scenes.geometry.raster)
 ROTATED_MULTIPLE = 64  # sides of those that are rotated afterwards: of every size is a network prepared anew (SDK)
 BACKGROUND_PX = 16  # side of blocks of a photo that without a point in them are background
@@ -34,7 +34,7 @@ class RefinerConfig:
     block: of the light one, `conv` (3x3) or `separable` (depthwise 3x3, then 1x1). join: how a skip meets what comes
     from below, `add` or `concat`. space_to_depth: whether it begins and ends at half
     resolution, 2x2 pixels as channels.
-    widths: channels at 1/2, 1/4, ... of the picture with space_to_depth, else at 1, 1/2, ...; rasters coarser than the
+    widths: channels at 1/2, 1/4, ... of the image with space_to_depth, else at 1, 1/2, ...; rasters coarser than the
     last are not read.
     """
 

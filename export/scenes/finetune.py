@@ -82,7 +82,7 @@ def rate_fraction(spent_s: float, saves_s: Sequence[float]) -> float:
 
 
 def measured(scene: TunedScene, views: Iterable[View]) -> float:
-    """Mean PSNR in dB of pictures of the scene."""
+    """Mean PSNR in dB of images of the scene."""
     return float(np.mean([psnr_db(scene.rendered(view.camera), view.image) for view in views]))
 
 
@@ -141,7 +141,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=60, help="how long to learn")
     parser.add_argument("--save-at", type=float, nargs="+", metavar="SECONDS", help="save several times; no --seconds")
     parser.add_argument(
-        "--pretrained", type=Path, help="compare pictures by these features too (export.teachers.backbone)"
+        "--pretrained", type=Path, help="compare images by these features too (export.teachers.backbone)"
     )
     parser.add_argument("--long-side", type=int, default=640, help="larger photos are made smaller, pixels")
     parser.add_argument("--unmeasured", action="store_true", help="do not measure on held-out photos")

@@ -64,7 +64,7 @@ def shown_in(points: Tensor, camera: Camera, options: Options) -> Tensor:
 
 
 def visibility_camera(camera: Camera, options: Options) -> Camera:
-    """The camera in whose picture visibility is decided."""
+    """The camera in whose image visibility is decided."""
     scale = options.visibility_scale
     return camera.resized(max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
 
@@ -206,7 +206,7 @@ def fitted_to_views(
 
 
 def coverage(rasters: list[Tensor]) -> Tensor:
-    """How much of a picture is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
+    """How much of an image is the refiner's, the rest is background: [1, H, W], 1 where there is a point in the 16 x
     16 pixels that a pixel is in, fading to 0 beyond (Coverage and kOwnBackgroundGain in the SDK)."""
     found = rasters[-1][None, RASTER - 1 :] * _CONFIDENCE[-1]
     for raster, confidence in zip(reversed(rasters[:-1]), reversed(_CONFIDENCE[:-1]), strict=True):
@@ -217,7 +217,7 @@ def coverage(rasters: list[Tensor]) -> Tensor:
 
 @torch.no_grad()
 def render(model: FittedPoints, camera: Camera, networks: Networks, options: Options) -> np.ndarray:
-    """The picture of a camera of any size and roll: RGB float32 [H, W, 3] in 0..1.
+    """The image of a camera of any size and roll: RGB float32 [H, W, 3] in 0..1.
 
     Rendered upright in the smallest frame that holds it, rotated back, cropped. Frames that are rotated have sides of a
     few sizes, so that those of a hand-held camera are mostly the same.

@@ -1,11 +1,11 @@
-"""How far a picture is from a photo, pixel by pixel: PSNR and SSIM. Every pixel counts, background too."""
+"""How far an image is from a photo, pixel by pixel: PSNR and SSIM. Every pixel counts, background too."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
-MIN_SQUARED_ERROR = 1e-10  # so that equal pictures have a PSNR, 100 dB
+MIN_SQUARED_ERROR = 1e-10  # so that equal images have a PSNR, 100 dB
 WINDOW_PX, SIGMA_PX = 11, 1.5
 C1, C2 = 0.01**2, 0.03**2
 
@@ -20,7 +20,7 @@ def ssim(picture: np.ndarray, target: np.ndarray) -> float:
 
     Wang, Bovik, Sheikh and Simoncelli 2004 (equation 13; K1 = 0.01, K2 = 0.03), with their window: 11 x 11, Gaussian,
     sigma 1.5, population variances. So the outermost 5 pixels count through their neighbours' windows alone. Theirs
-    are grey pictures; here each channel is one. Raises ValueError for other shapes, or pictures smaller than a window.
+    are grey images; here each channel is one. Raises ValueError for other shapes, or images smaller than a window.
     """
     if picture.shape != target.shape or picture.ndim != 3 or min(picture.shape[:2]) < WINDOW_PX:
         raise ValueError(

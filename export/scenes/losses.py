@@ -15,7 +15,7 @@ from export.scenes.perceptual import Perceptual
 
 @dataclass(frozen=True)
 class LossWeights:
-    """quarter: L1 of pictures a quarter as wide. perceptual: see `Perceptual`. own: L1 of the target made from its own
+    """quarter: L1 of images a quarter as wide. perceptual: see `Perceptual`. own: L1 of the target made from its own
     features; off, since three of them are the target's colours and little is left to learn. full: L1 of all pixels,
     which the paper does not have; PSNR is measured here too.
 
@@ -31,7 +31,7 @@ class LossWeights:
 def picture_terms(
     picture: Tensor, target: Tensor, mask: Tensor, weights: LossWeights, perceptual: Perceptual | None
 ) -> dict[str, Tensor]:
-    """Pictures RGB [N, 3, H, W], mask [N, 1, H, W] of the target's pixels that are there."""
+    """Images RGB [N, 3, H, W], mask [N, 1, H, W] of the target's pixels that are there."""
     off = (picture - target) * mask
     share = mask.mean().clamp_min(1e-6)
     terms = {
@@ -44,7 +44,7 @@ def picture_terms(
 
 
 def own_rasters(features: Tensor) -> list[Tensor]:
-    """A picture's own features [N, 8, H, W] as if they were a dense cloud's: rasters [N, 9, H/2^k, W/2^k], with holes.
+    """An image's own features [N, 8, H, W] as if they were a dense cloud's: rasters [N, 9, H/2^k, W/2^k], with holes.
 
     A pixel of scale s stays with probability 1 - s / 2: holes are most frequent where points are sparse for pixels.
     """

@@ -1,4 +1,4 @@
-"""Pictures compared by the features of a network that has seen photographs.
+"""Images compared by the features of a network that has seen photographs.
 
 The paper takes VGG-19, whose weights cannot be had from a package with a clear licence (those of edge detectors that
 contain VGG-16 were tuned on BSDS500, which is for research only). The person detector's MobileNetV2
@@ -17,7 +17,7 @@ from export.densepose.network import MobileNetV2
 
 
 class Perceptual(nn.Module):
-    """Distance of pictures RGB [N, 3, H, W] in 0..1: L1 of features at strides 2, 4, 8, 16, each relative to the mean
+    """Distance of images RGB [N, 3, H, W] in 0..1: L1 of features at strides 2, 4, 8, 16, each relative to the mean
     size of the target's, and averaged. Sees 0 outside of `mask` [N, 1, H, W] in both."""
 
     _TAPS = (0, 2, 5, 12)  # blocks of the trunk

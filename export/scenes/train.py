@@ -4,8 +4,8 @@
         --pretrained .data/teachers/backbone.pt
 
 `--data` holds folders `train` and `val` of captures (export.scenes.captures). `--pretrained` is the file of
-export.teachers.backbone: the extractor's trunk starts from it, and pictures are compared by its features; without it
-the trunk starts from random weights and pictures are compared by their pixels alone. It resumes from `--out` by itself,
+export.teachers.backbone: the extractor's trunk starts from it, and images are compared by its features; without it
+the trunk starts from random weights and images are compared by their pixels alone. It resumes from `--out` by itself,
 saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt (for export.scenes.export_onnx), log.json, curves.png,
 and sample.png: photo, ours, the plain points.
 """
@@ -82,7 +82,7 @@ def batch_terms(
         picture = networks.refiner([torch.stack(level) for level in zip(*rasters, strict=True)])
         terms = picture_terms(picture.float(), target, mask, weights, perceptual)
     if weights.own:
-        # The refiner alone: what it makes of a picture's own features should be the picture.
+        # The refiner alone: what it makes of an image's own features should be the image.
         with torch.no_grad():
             features = networks.extractor(target)
         own = networks.refiner(own_rasters(features))
@@ -184,7 +184,7 @@ class Run:
         write_log(self.log, self.config.out, FIGURES, against="step", label="validation, dB")
 
     def check(self, captures: Sequence[Capture]) -> None:
-        """Adds figures on held-out photos to the log and writes sample.png."""
+        """Adds metrics on held-out photos to the log and writes sample.png."""
         figures, sheet = validate(self.networks, captures, self.config.long_side)
         self.log.append({"step": self.step, "spent": self.spent_s, **figures})
         cv2.imwrite(str(self.config.out / "sample.png"), sheet[..., ::-1])

@@ -1,7 +1,7 @@
 """The models of depth cameras of `sensors.py` in torch: batches of frames, each through a sensor of its own.
 
 For a GPU, where one frame after the other would be the slowest part of a training. `sensors.py` is the reference and
-says where figures come from; given the same random numbers both report the same depth. Blurs and changes of size are
+says where metrics come from; given the same random numbers both report the same depth. Blurs and changes of size are
 products with matrices, so that each frame has its own width of blur; they need float32 as it is: neither autocast
 nor TF32, whose 10 bits are a footprint and more.
 """
@@ -44,7 +44,7 @@ def _each(values: Tensor) -> Tensor:
 
 
 def _gaussian_matrix(sigma_px: Tensor, radius_px: Tensor, side: int) -> Tensor:
-    """[N, side, side]: row i are the weights of a Gaussian about i, cut off at the radius, with the picture mirrored
+    """[N, side, side]: row i are the weights of a Gaussian about i, cut off at the radius, with the image mirrored
     about its first and last pixel."""
     at = torch.arange(side, device=sigma_px.device, dtype=torch.float32)
     out, source = at[:, None], at[None, :]
@@ -68,7 +68,7 @@ def _blurred(planes: Tensor, sigma_px: Tensor, radius_px: Tensor) -> Tensor:
 
 
 def _cv2_radius(sigma_px: Tensor) -> Tensor:
-    """Where cv2.GaussianBlur ends by itself on float pictures."""
+    """Where cv2.GaussianBlur ends by itself on float images."""
     return (torch.round(8 * sigma_px + 1).int() | 1).sub(1).div(2).float()
 
 
@@ -83,7 +83,7 @@ def _smooth_noise(draws: Draws, shape: Sequence[int], sigma_px: Tensor) -> Tenso
 
 
 def _blobs(draws: Draws, shape: Sequence[int], share: Tensor, size_px: Tensor) -> Tensor:
-    """Masks that cover about `share` [N] of each picture, in blobs of about size_px [N]."""
+    """Masks that cover about `share` [N] of each image, in blobs of about size_px [N]."""
     field = _smooth_noise(draws, shape, size_px)
     ordered = field.flatten(1).sort(1).values
     at = (1 - share.clamp_max(1)) * (ordered.shape[1] - 1)
@@ -185,7 +185,7 @@ def structured_light(depth: Tensor, focal_px: Tensor, sensor: dict[str, Tensor],
 
 
 def _shrinking(side: int, small: int, device: torch.device) -> Tensor:
-    """[small, side]: means over the part of the picture that each small pixel covers."""
+    """[small, side]: means over the part of the image that each small pixel covers."""
     rims = torch.arange(small + 1, device=device, dtype=torch.float64) * (side / small)
     at = torch.arange(side, device=device, dtype=torch.float64)
     ends = torch.minimum(rims[1:, None], at + 1) - torch.maximum(rims[:-1, None], at)

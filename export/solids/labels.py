@@ -137,7 +137,7 @@ class Labeller:
         c = self.curves
         if c is None:
             return []
-        # Steps of half a pixel in each knot interval, evenly in the picture for straight lines.
+        # Steps of half a pixel in each knot interval, evenly in the image for straight lines.
         a = np.flatnonzero(c.knot_edge[:-1] == c.knot_edge[1:])
         edge, t0, t1 = c.knot_edge[a], c.knot_t[a], c.knot_t[a + 1]
         near = 1e-4
@@ -154,7 +154,7 @@ class Labeller:
         owner = np.repeat(np.arange(len(edge)), steps + 1)
         first = np.cumsum(steps + 1) - steps - 1
         s = (np.arange(len(owner)) - first[owner]) / steps[owner]
-        # A fraction of the way in the picture is this fraction of the way in space.
+        # A fraction of the way in the image is this fraction of the way in space.
         s = s * zp[owner] / np.maximum(s * zp[owner] + (1 - s) * zq[owner], 1e-12)
         t = t0[owner] + (t1 - t0)[owner] * s
         e = edge[owner]

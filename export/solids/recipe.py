@@ -189,7 +189,7 @@ def _camera(rng: Rng, stage: str, bounds: np.ndarray, pixels: float) -> Camera:
 
 
 def looking(way: np.ndarray) -> np.ndarray:
-    """World to camera, [3, 3], of a camera that looks that way with its picture upright."""
+    """World to camera, [3, 3], of a camera that looks that way with its image upright."""
     z = way / np.linalg.norm(way)
     up = np.array([0, 0, 1.0]) if abs(z[2]) < 0.999 else np.array([0, 1.0, 0])
     x = np.cross(z, up)

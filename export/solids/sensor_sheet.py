@@ -32,7 +32,7 @@ RANGES_M = np.geomspace(0.3, 6, 14)
 _FULL_R = 4.0
 _COLUMNS = 8
 
-# Figures that others measured or state: label, ranges in metres, standard deviations in metres.
+# Metrics that others measured or state: label, ranges in metres, standard deviations in metres.
 PUBLISHED: tuple[tuple[str, np.ndarray, np.ndarray], ...] = (
     (
         "Kinect v1, Nguyen, Izadi and Lovell 2012: 1.2 mm + 1.9 mm (z - 0.4)²",

@@ -2,7 +2,7 @@
 
 A sensor takes exact depth (float [H, W], metres, 0 where nothing is) and the focal length in pixels and returns what
 the camera would report, float32, 0 where it reports nothing. Nothing else of the scene is asked for: slopes and
-silhouettes come from the depth itself. Sources of the figures stand beside them.
+silhouettes come from the depth itself. Sources of the metrics stand beside them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def _smooth_noise(rng: np.random.Generator, shape: tuple[int, int], sigma_px: fl
 
 
 def _blobs(rng: np.random.Generator, shape: tuple[int, int], share: float, size_px: float) -> np.ndarray:
-    """A mask that covers about `share` of a picture, in blobs of about size_px."""
+    """A mask that covers about `share` of an image, in blobs of about size_px."""
     if share <= 0:
         return np.zeros(shape, bool)
     field = _smooth_noise(rng, shape, size_px)
@@ -70,7 +70,7 @@ class Stereo:
     window_px: int = 7
     baseline_m: float = 0.05
     step_px: float = 1 / 32
-    holes: float = 0.01  # textureless places and speckles, share of the picture
+    holes: float = 0.01  # textureless places and speckles, share of the image
 
     def __call__(self, depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.ndarray:
         strength = focal_px * self.baseline_m
@@ -166,11 +166,11 @@ class StructuredLight:
 
 @dataclass(frozen=True)
 class Phone:
-    """Depth of a phone: few pixels, smoothed, then enlarged to the picture (ARCore, ARKit: 160 x 90 to 256 x 192)."""
+    """Depth of a phone: few pixels, smoothed, then enlarged to the image (ARCore, ARKit: 160 x 90 to 256 x 192)."""
 
     factor: int = 2
     sigma: float = 0.004  # of the depth, correlated
-    smoothing_px: float = 1.0  # in the small picture
+    smoothing_px: float = 1.0  # in the small image
 
     def __call__(self, depth: np.ndarray, focal_px: float, rng: np.random.Generator) -> np.ndarray:
         height, width = depth.shape

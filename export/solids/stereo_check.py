@@ -3,7 +3,7 @@
     python -m export.solids.stereo_check --solids 24
 
 Solids of `val` are seen by two cameras 5 cm apart and lit by a projector of random dots between them, as in RealSense
-and OAK-D Pro; each picture is rendered three times as large and averaged, with grey noise. A table says of OpenCV's
+and OAK-D Pro; each image is rendered three times as large and averaged, with grey noise. A table says of OpenCV's
 matching and of the model, on the same depth: the noise of disparity away from jumps (half of the range between its 16 %
 and 84 % quantiles), how far neighbours share it, by how many pixels the foreground is fattened, and which part of the
 known pixels is lost.
@@ -31,8 +31,8 @@ SIZE_PX = 640, 480
 BASELINE_M = 0.05
 DISPARITIES_PX = 128
 BLOCK_PX = 5
-_FINER = 3  # pictures are rendered so many times as large
-_DOTS_PX = 1400  # of the projector's square picture
+_FINER = 3  # images are rendered so many times as large
+_DOTS_PX = 1400  # of the projector's square image
 _DOT_RATIO = 0.06
 _PROJECTED_SLOPE = 1.3  # from the middle to the border of that picture: sideways by depth
 _GREY_NOISE = 2.5

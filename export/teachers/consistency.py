@@ -50,7 +50,7 @@ class Answer:
         )  # fmt: skip
 
     def mirrored(self) -> Answer:
-        """The answer about the mirrored picture as one about the picture."""
+        """The answer about the mirrored image as one about the image."""
         part = torch.from_numpy(MIRROR_PART).long()
 
         def flipped(chart: Tensor, flips: np.ndarray) -> Tensor:
@@ -82,7 +82,7 @@ class Consensus:
     @torch.no_grad()
     def ask(self, image: np.ndarray, mask: np.ndarray) -> tuple[Answer, np.ndarray]:
         """The mean answer about the person with the outline `mask` bool [H, W] in `image` uint8 [H, W, 3] BGR, and the
-        box float64 [4] in the picture that its grid lies on."""
+        box float64 [4] in the image that its grid lies on."""
         box = turned_box(outline(mask), np.eye(2))
         answers = []
         for side in self.sides_px:

@@ -16,7 +16,7 @@ from export.teachers.models import model_file
 
 POINTS = 468
 SIDE, DETECTOR_SIDE = 192, 128
-RIGHT_EYE, LEFT_EYE = 33, 263  # outer corners; the person's right is on the picture's left
+RIGHT_EYE, LEFT_EYE = 33, 263  # outer corners; the person's right is on the image's left
 _PACKAGE, _MODELS = "mediapipe-faces", "mediapipe/modules/"
 _MARGIN = 1.5  # of the square looked at, in longer sides of the face's box
 _MIN_SCORE, _MIN_PRESENCE = 0.5, 0.5

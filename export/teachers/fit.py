@@ -32,7 +32,7 @@ Photos with fits are skipped, so an interrupted run goes on where it stopped. ex
 that are believed.
 """
 _TILE_PX, _SHEET_PX = 220, 1600  # height of the sheet's tiles, width of its rows
-_SHEET_TILES = 120  # more make a picture that nobody opens
+_SHEET_TILES = 120  # more make an image that nobody opens
 
 
 @dataclass(frozen=True)

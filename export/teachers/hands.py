@@ -28,7 +28,7 @@ _FLESH = 0.09  # of the hand's size: fingers are this much wider than the lines 
 
 @dataclass(frozen=True)
 class Hand:
-    """point: float64 [21, 2] pixels of the picture, from the wrist to the tip of the little finger. presence:
+    """point: float64 [21, 2] pixels of the image, from the wrist to the tip of the little finger. presence:
     probability that the square looked at shows a hand."""
 
     point: np.ndarray

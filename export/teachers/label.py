@@ -92,7 +92,7 @@ def label_photo(image: np.ndarray, detect: Detect, find: Find, outline: Outline)
 
 
 def whole_bodies(box: np.ndarray, height: int) -> list[np.ndarray]:
-    """Where the whole person may be: the box and, if the picture's lower border cuts it, longer ones.
+    """Where the whole person may be: the box and, if the image's lower border cuts it, longer ones.
 
     The landmark network takes what it is shown for a whole body; shown a head alone it finds the body in the face.
     """

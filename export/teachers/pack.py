@@ -3,7 +3,7 @@
     python -m export.teachers.pack make people.pack     here, where assets, backgrounds and labelled photographs are
     python -m export.teachers.pack open people.pack     there: .data as `export.people.dataset` and training read it
 
-Pictures are kept smaller and as JPEG: the skin at 1024 pixels, photographs and backgrounds with a long side of 512;
+Images are kept smaller and as JPEG: the skin at 1024 pixels, photographs and backgrounds with a long side of 512;
 body shapes are in half precision already. Some fabrics, panoramas and coats of animals are left out (`Sizes`), so that
 renderings of the pack are not those of the whole assets. `scripts/train-from-pack.sh` does all that follows.
 """

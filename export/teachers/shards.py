@@ -28,7 +28,7 @@ from export.teachers.fit import PhotoFits
 from export.teachers.hands import SIDES, Hand, HandNetwork, hands_of
 from export.teachers.label import PhotoLabels
 
-LONG_SIDE = 800  # people are then as sharp in training as in a camera's picture at the size of the networks' input
+LONG_SIDE = 800  # people are then as sharp in training as in a camera's image at the size of the networks' input
 MIN_SCORE = 0.5  # of the detector; less sure boxes are regions that training leaves out
 _BORDER = 0.012  # of the person's height: this close to the mask's edge a pixel may be the person or not
 MIN_CROP_PX = 60  # height of people worth cutting out
@@ -204,7 +204,7 @@ def write_training_set(
     pictures: list[tuple[np.ndarray, np.ndarray]], empty: list[tuple[np.ndarray, np.ndarray]], repeat: int,
     composed_images: int, out: Path,
 ) -> tuple[int, int]:  # fmt: skip
-    """Shards of pictures with people and without, each `repeat` times, and of images composed of both. Returns how many
+    """Shards of images with people and without, each `repeat` times, and of images composed of both. Returns how many
     people were cut out and how many images composed."""
     people = [person for picture in pictures for person in cut_outs(*picture)]
     every = (pictures + empty) * repeat

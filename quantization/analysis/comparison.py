@@ -1,6 +1,6 @@
 """Tensor by tensor: how much error an int8 graph makes here, and how much has gathered.
 
-All figures are signal to noise ratios in dB against the prepared float graph. An activation has two: `here`, the float
+All metrics are signal to noise ratios in dB against the prepared float graph. An activation has two: `here`, the float
 tensor against its own quantize-dequantize (what this pair alone does), and `gathered`, the float tensor against the
 same tensor of the int8 graph. A node's `jump` is the worst gathered figure of its inputs less that of its output: how
 much this node spoils.
@@ -23,7 +23,7 @@ from quantization.samples import Sample
 
 @dataclass(frozen=True)
 class TensorError:
-    """One tensor of one graph; figures in dB, None where they do not apply.
+    """One tensor of one graph; metrics in dB, None where they do not apply.
 
     kind: "weight", "bias" or "activation". here: this tensor's own rounding. worst_channel: the lowest `here` of its
     channels (weights). gathered: with all that came before. jump: dB lost from the worst input of `node`, which
@@ -107,7 +107,7 @@ def pair_errors(
 def activation_errors(
     graph: str, reference: onnx.ModelProto, quantized: onnx.ModelProto, samples: list[Sample]
 ) -> list[TensorError]:
-    """Every activation that both graphs have, with all its figures."""
+    """Every activation that both graphs have, with all its metrics."""
     pairs = {pair.name: pair for pair in qdq.pairs(quantized.graph)}
     there = set(tensor_names(quantized))
     names = [n for n in tensor_names(reference) if n in pairs or n in there]
@@ -148,7 +148,7 @@ def _makers(graph: onnx.GraphProto) -> dict[str, tuple[str, str]]:
 
 
 def worst_first(errors: list[TensorError]) -> list[TensorError]:
-    """By the lowest of each tensor's figures. A bias counts as a whole: channels that are nearly zero do no harm."""
+    """By the lowest of each tensor's metrics. A bias counts as a whole: channels that are nearly zero do no harm."""
 
     def key(error: TensorError) -> float:
         figures = [error.here, error.gathered, None if error.kind == "bias" else error.worst_channel]

@@ -1,1 +1,1 @@
-"""Pictures of made heads drawn, cropped and learnt from on one graphics processor, without files of pictures."""
+"""Images of made heads drawn, cropped and learnt from on one graphics processor, without files of images."""

@@ -18,7 +18,7 @@ from export.heads.encoder_training.head_images import Pool
 from export.heads.encoder_training.image_corruptions import as_cameras_see
 from export.heads.head_shards import FACE_SIDES, LABEL_STEP, POINT_SCALE
 
-CHUNK = 64  # crops cut at once: pictures are copied as floats
+CHUNK = 64  # crops cut at once: images are copied as floats
 _GREY = 127.0
 
 
@@ -44,7 +44,7 @@ def uniform(count: int, low: float, high: float, random: torch.Generator) -> Ten
 
 
 def placings(side: int, face: Tensor, of_face: Tensor, random: torch.Generator) -> Placings:
-    """`encoder_data.placing`, augmented, of B crops of pictures of `side` pixels. face [B, 4]: boxes, NaN where there
+    """`encoder_data.placing`, augmented, of B crops of images of `side` pixels. face [B, 4]: boxes, NaN where there
     is none; of_face bool [B]: whose crops show the face alone. All on the CPU."""
     count = len(face)
     of_face = of_face & torch.isfinite(face).all(1)
@@ -65,7 +65,7 @@ def placings(side: int, face: Tensor, of_face: Tensor, random: torch.Generator) 
 
 
 def cut(pictures: Tensor, place: Placings, border: str = "zeros", nearest: bool = False) -> Tensor:
-    """Crops [B, C, 192, 192] of pictures float [B, C, H, W]; where pictures shrink, of four places a pixel."""
+    """Crops [B, C, 192, 192] of pictures float [B, C, H, W]; where images shrink, of four places a pixel."""
     device = pictures.device
     height, width = pictures.shape[2:]
     index = torch.arange(CROP_PX, device=device, dtype=torch.float32)
@@ -153,7 +153,7 @@ class Cropper:
 
     @torch.no_grad()
     def made(self, pool: Pool, filled: int, count: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Crops of the first `filled` pictures of a pool: image float32 [B, 192, 192, 3], template
+        """Crops of the first `filled` images of a pool: image float32 [B, 192, 192, 3], template
         [B, 48, 48, 3] dm, matte [B, 48, 48], normal [B, 48, 48, 3]."""
         random = self._random
         number = torch.randint(filled, (count,), generator=random).to(self.device)

@@ -56,7 +56,7 @@ class _Places:
 
 @dataclass
 class Meshes:
-    """H heads' triangles, one after another, and K pictures to be drawn of each.
+    """H heads' triangles, one after another, and K images to be drawn of each.
 
     positions, normals, template float32 [V, 3], dm; shade [V]: how much hair the skin has; faces int64 [F, 3], of all
     vertices; uv float32 [F, 3, 2]; kind int64 [F]; face_head [F]; tone, hair, iris float32 [H, 3], RGB; brows [H].
@@ -100,7 +100,7 @@ def extras_row(extras: Extras, gloss: float) -> np.ndarray:
 
 
 class HeadStream(IterableDataset):
-    """Endless `Meshes` of `heads` heads each, `views` pictures a head."""
+    """Endless `Meshes` of `heads` heads each, `views` images a head."""
 
     def __init__(self, packed: PackedHeads, heads: int, views: int, seed: int) -> None:
         self.packed, self.heads, self.views, self.seed = packed, heads, views, seed

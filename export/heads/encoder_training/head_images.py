@@ -1,6 +1,6 @@
-"""Pictures of made heads as `export.heads.views` makes them, drawn in torch many at a time, and a pool of them.
+"""Images of made heads as `export.heads.views` makes them, drawn in torch many at a time, and a pool of them.
 
-What differs from the pictures with rays: shadows come from depth seen from each lamp, and normals where skin, eyes and
+What differs from the images with rays: shadows come from depth seen from each lamp, and normals where skin, eyes and
 hair meet are those of each part alone.
 """
 
@@ -24,7 +24,7 @@ _TEXTURE_MEAN = (185.0, 145.0, 123.0)
 
 @dataclass
 class Pool:
-    """N pictures, the fields of `HeadPictures` that crops are cut from. planes uint8 [N, 512, 512, 4]: RGB and masks;
+    """N images, the fields of `HeadPictures` that crops are cut from. planes uint8 [N, 512, 512, 4]: RGB and masks;
     template int16 [N, 256, 256, 3]; normal int8 [N, 256, 256, 3]; face float32 [N, 4]: box of the face, px, NaN where
     too little is seen of it."""
 
@@ -71,7 +71,7 @@ def piecewise(x: Tensor, at: tuple[float, ...], values: tuple[float, ...]) -> Te
 
 
 class Painter:
-    """Draws batches of pictures. skin: texture, RGB uint8 [H, W, 3]; eye [3]: middle of the template's right eye."""
+    """Draws batches of images. skin: texture, RGB uint8 [H, W, 3]; eye [3]: middle of the template's right eye."""
 
     def __init__(self, skin: Tensor, eye: Tensor, device: torch.device, seed: int) -> None:
         self.skin, self.eye, self.device = skin.to(device).float(), eye.float().to(device), device
@@ -82,7 +82,7 @@ class Painter:
 
     @torch.no_grad()
     def draw(self, heads: Meshes, view: int) -> Pool:
-        """Picture `view` of each head, H pictures; everything on the painter's device."""
+        """Image `view` of each head, H images; everything on the painter's device."""
         count = len(heads.tone)
         camera, extras = heads.cameras[:, view], heads.extras[:, view]
         of_face = heads.face_head
@@ -240,7 +240,7 @@ class Painter:
 
 
 def face_boxes(faces: Tensor) -> Tensor:
-    """As `encoder_data.face_box_of`, of B maps bool [B, H, W] of where the face is: [B, 4] in pixels of the picture,
+    """As `encoder_data.face_box_of`, of B maps bool [B, H, W] of where the face is: [B, 4] in pixels of the image,
     NaN where too few are."""
     total = faces.sum((1, 2))
     strays = (STRAY_FRACTION * total).long()

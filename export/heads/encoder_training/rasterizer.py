@@ -1,6 +1,6 @@
-"""Triangles to pixels in torch: which triangle each pixel of several pictures sees, by a depth buffer.
+"""Triangles to pixels in torch: which triangle each pixel of several images sees, by a depth buffer.
 
-All pictures of a batch go through the same few tensor operations, on whatever device their tensors are.
+All images of a batch go through the same few tensor operations, on whatever device their tensors are.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Trains the encoder of heads for a given time on pictures that are drawn while it learns, and on real faces.
+"""Trains the encoder of heads for a given time on images that are drawn while it learns, and on real faces.
 
     python -m export.heads.encoder_training.pack heads.pack
     python -m export.heads.encoder_training.train heads.pack --seconds 520 --out .data/runs/heads-encoder
@@ -46,7 +46,7 @@ WARM_UP_STEPS = 100
 
 @dataclass(frozen=True)
 class Sizes:
-    """heads of one drawing, pictures a head, pictures in the pool and before training starts, crops of a batch."""
+    """heads of one drawing, images a head, images in the pool and before training starts, crops of a batch."""
 
     heads: int
     views: int
@@ -63,14 +63,14 @@ class Sizes:
 
 
 class Supply:
-    """Fills a pool with pictures, the oldest first, of heads that other processes make."""
+    """Fills a pool with images, the oldest first, of heads that other processes make."""
 
     def __init__(self, batches, painter: Painter, sizes: Sizes, device: torch.device) -> None:
         self._batches, self._painter, self._sizes, self._device = batches, painter, sizes, device
         self.pool, self.filled, self._at, self._view, self._heads = Pool.empty(sizes.pool, device), 0, 0, 0, None
 
     def draw(self) -> None:
-        """Replaces as many pictures as there are heads in a drawing."""
+        """Replaces as many images as there are heads in a drawing."""
         if self._heads is None or self._view == self._sizes.views:
             self._heads, self._view = next(self._batches).to(self._device), 0
         pictures = self._painter.draw(self._heads, self._view)

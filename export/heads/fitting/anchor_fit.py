@@ -264,7 +264,7 @@ def _start(terms: AnchorTerms, seen: Observations) -> ScaledPose:
         terms.inverse_variance = torch.from_numpy(sigma**-2.0)
         if torch.equal(terms.is_inlier(pose, zero), inliers):
             break
-    # One that sees more of the far side of the head than of the near one is that of a mirrored picture, which looks the
+    # One that sees more of the far side of the head than of the near one is that of a mirrored image, which looks the
     # same without perspective.
     camera, shown = pose.camera(), points[inliers.numpy()]
     eye = -camera.rotation.T @ camera.shift

@@ -145,7 +145,7 @@ def shows_head(cells: np.ndarray) -> np.ndarray:
 
 
 def read_photo(path: Path) -> np.ndarray:
-    """BGR. Raises NoHead for what is no picture, OSError for what cannot be read."""
+    """BGR. Raises NoHead for what is no image, OSError for what cannot be read."""
     bgr = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
     if bgr is None:
         raise NoHead(f"{path} is no picture that can be read; give a JPEG or PNG file.")

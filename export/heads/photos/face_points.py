@@ -1,10 +1,10 @@
-"""Where MediaPipe's 468 face points lie on the template head, by showing its network pictures of made heads.
+"""Where MediaPipe's 468 face points lie on the template head, by showing its network images of made heads.
 
     python -m export.heads.photos.face_points --data .data/heads/views --out export/heads/photos/face_points.json
 
-Of each head one picture from the front is shown; a point's place is the median of the template points at the pixels
+Of each head one image from the front is shown; a point's place is the median of the template points at the pixels
 where the network puts it. Points that wander over the heads (the outline of the face, what hair covers) are marked as
-not used. Writes the JSON and, beside it in .data, a picture of the points on a held-out head.
+not used. Writes the JSON and, beside it in .data, an image of the points on a held-out head.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, read
 FILE = Path(__file__).with_name("face_points.json")
 MAX_YAW, MAX_PITCH, MAX_ROLL = np.radians(30), np.radians(25), np.radians(25)
 MAX_SPREAD = 0.05  # dm; of a point over heads
-MIN_SEEN = 0.6  # share of the pictures in which the point lies on the head
+MIN_SEEN = 0.6  # share of the images in which the point lies on the head
 _GREY = 127
 
 
 @dataclass(frozen=True)
 class FacePoints:
     """template float64 [468, 3] dm; normal [468, 3] there, outwards, in the head's frame; spread [468] dm, median
-    distance over heads; seen [468], share of pictures with the point on the head; used bool [468]."""
+    distance over heads; seen [468], share of images with the point on the head; used bool [468]."""
 
     template: np.ndarray
     normal: np.ndarray
@@ -61,7 +61,7 @@ def write_face_points(points: FacePoints, made: dict, path: Path) -> None:
 
 
 def frontal(pictures: HeadPictures) -> np.ndarray:
-    """Numbers of the pictures that show the face upright and from the front, the most frontal first."""
+    """Numbers of the images that show the face upright and from the front, the most frontal first."""
     rotation, shift = pictures.rotation.astype(np.float64), pictures.shift.astype(np.float64)
     camera = -np.einsum("kij,ki->kj", rotation, shift)  # in the head's frame
     yaw = np.arctan2(camera[:, 0], -camera[:, 1])
@@ -73,7 +73,7 @@ def frontal(pictures: HeadPictures) -> np.ndarray:
 
 
 def on_template(pictures: HeadPictures, k: int, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Template points [N, 3] (dm) and normals [N, 3] (head's frame) at pixels [N, 2] of picture k, NaN off the head.
+    """Template points [N, 3] (dm) and normals [N, 3] (head's frame) at pixels [N, 2] of image k, NaN off the head.
 
     Between the stored pixels template points are mixed where the surface is one piece."""
     template = pictures.template[k].astype(np.float64) / POINT_SCALE
@@ -102,13 +102,13 @@ def on_template(pictures: HeadPictures, k: int, pixels: np.ndarray) -> tuple[np.
 
 
 def shown(pictures: HeadPictures, k: int) -> np.ndarray:
-    """Picture k before grey, BGR."""
+    """Image k before grey, BGR."""
     empty = pictures.masks[k] == 0
     return np.where(empty[..., None], np.uint8(_GREY), pictures.rgb[k])[..., ::-1].copy()
 
 
 def median_points(template: np.ndarray, normal: np.ndarray) -> FacePoints:
-    """template, normal: [K, 468, 3] of K pictures, NaN where off the head."""
+    """template, normal: [K, 468, 3] of K images, NaN where off the head."""
     seen = np.isfinite(template[..., 0]).mean(0)
     if (seen == 0).any():
         raise ValueError("some points lie on no head at all: show more pictures.")
@@ -149,7 +149,7 @@ def collect(folder: Path, count: int) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def drawn(points: FacePoints, pictures: HeadPictures, k: int, zoom: int = 3) -> np.ndarray:
-    """Picture k with the points where its template labels say they are: used ones green, others red. BGR."""
+    """Image k with the points where its template labels say they are: used ones green, others red. BGR."""
     image = cv2.resize(shown(pictures, k), None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
     template = pictures.template[k].astype(np.float64) / POINT_SCALE
     y, x = np.nonzero((pictures.normal[k] != 0).any(-1))
@@ -165,7 +165,7 @@ def drawn(points: FacePoints, pictures: HeadPictures, k: int, zoom: int = 3) -> 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path(".data/heads/views"))
-    parser.add_argument("--count", type=int, default=300, help="pictures, one a head")
+    parser.add_argument("--count", type=int, default=300, help="images, one a head")
     parser.add_argument("--out", type=Path, default=FILE)
     parser.add_argument("--picture", type=Path, default=Path(".data/heads/face_points.png"))
     arguments = parser.parse_args()

@@ -108,7 +108,7 @@ def weights_of(face: Face, points: FacePoints, pose: FacePose) -> np.ndarray:
 
 
 def inside(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """bool [N]: which pixels [N, 2] lie in a picture of H x W."""
+    """bool [N]: which pixels [N, 2] lie in an image of H x W."""
     return ((pixels >= 0) & (pixels <= np.array(shape[::-1]) - 1)).all(1)
 
 

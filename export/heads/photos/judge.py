@@ -111,7 +111,7 @@ def main() -> None:
     parser.add_argument("--encoder", type=Path, default=Path(".data/runs/heads-encoder/weights.pt"))
     parser.add_argument("--photos", type=Path, default=Path(".data/heads/photos"))
     parser.add_argument("--split", choices=SPLITS, default="val")
-    parser.add_argument("--sheet", type=Path, help="picture to write; default: none")
+    parser.add_argument("--sheet", type=Path, help="image to write; default: none")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     encoder, crops = load_encoder(arguments.encoder), faces_of(arguments.photos, arguments.split)

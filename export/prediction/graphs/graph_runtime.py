@@ -16,7 +16,7 @@ from export.prediction.graphs.transformer_file import TransformerTables
 from export.prediction.graphs.transformer_graphs import CONTEXT, NEIGHBOURS, SLICES, head_name, slice_names
 from export.prediction.transformer import UNSEEN
 
-# Logits [K] of slice k at a place -> the code.
+# Logits [K] of slice k at a cell -> the code.
 Choice = Callable[[int, int, np.ndarray], int]
 
 
@@ -70,7 +70,7 @@ class GraphRuntime:
         return np.stack(found)
 
     def chosen(self, choose: Choice) -> np.ndarray:
-        """Codes int64 [slices, 16, 16], place after place; `choose` is given slice, place and logits."""
+        """Codes int64 [slices, 16, 16], cell after cell; `choose` is given slice, cell and logits."""
         codes = np.zeros((self.slice_count, PLACES), np.int64)
         embedded = np.zeros(
             (CODE_SIDE + 2, CODE_SIDE + 2, self.tables.slice_rows.shape[1]), np.float32
@@ -102,7 +102,7 @@ class GraphRuntime:
         return self.slice_graph.run(None, {name: np.ascontiguousarray(array) for name, array in given.items()})
 
     def _head(self, k: int, features: np.ndarray, known: np.ndarray) -> np.ndarray:
-        """known: codes [k, places] of the slices before -> logits [places, K]."""
+        """known: codes [k, cells] of the slices before -> logits [cells, K]."""
         earlier = np.zeros_like(features[0])
         for table, codes in zip(self.tables.earlier[k], known, strict=True):
             earlier = earlier + table[codes]

@@ -1,15 +1,15 @@
-"""The transformer as ONNX graphs for a runtime that keeps keys and values: what was computed for places before is not
+"""The transformer as ONNX graphs for a runtime that keeps keys and values: what was computed for cells before is not
 computed again. Look-ups, sums of embedded codes and the relative bias of the slice network are the runtime's
 (`graph_runtime.py`).
 
 `context.onnx`, once a frame: summed [1, 256, embedding], time_step [1, 1] (log2 of 10 / fps) -> context
 [1, 256, width].
 
-`slices.onnx`, for R places of each of N samples of the frame that is made: context [N, R, width] of theirs; near
+`slices.onnx`, for R cells of each of N samples of the frame that is made: context [N, R, width] of theirs; near
 [N, R, 7 * embedding], the embedded codes of two rows above, three wide, and of the left neighbour; of each layer keys_l
-and values_l [N, heads, C, head_width] of places before, and bias_l [heads, R, C + R], added to the scores of those and
-of the R places themselves, -infinity where a place is not seen -> features [N, R, width], and new_keys_l, new_values_l
-[N, heads, R, head_width]. One place at a time: R = 1, C = 256; a whole frame at once: R = 256, C = 0.
+and values_l [N, heads, C, head_width] of cells before, and bias_l [heads, R, C + R], added to the scores of those and
+of the R cells themselves, -infinity where a cell is not seen -> features [N, R, width], and new_keys_l, new_values_l
+[N, heads, R, head_width]. One cell at a time: R = 1, C = 256; a whole frame at once: R = 256, C = 0.
 
 `head_k.onnx`: features [N, R, width], earlier [N, R, width] (sum of the tables of slices before) -> logits [N, R, K].
 """
@@ -50,7 +50,7 @@ class ContextGraph(nn.Module):
 
 
 class CachedLayer(nn.Module):
-    """`AttentionLayer` for some places, with keys and values of others given."""
+    """`AttentionLayer` for some cells, with keys and values of others given."""
 
     def __init__(self, layer: AttentionLayer) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Writes what the SDK foresees of clips by `auto`, as pictures of 64 x 64: what the network that mends it is given.
+"""Writes what the SDK foresees of clips by `auto`, as images of 64 x 64: what the network that mends it is given.
 
     python -m export.clips.dataset pushing --large --clips 700 --out .data/clips-large
     python -m export.prediction.refiner.auto_predictions --data .data/clips-large --sets pushing collages

@@ -5,8 +5,8 @@
     python -m export.prediction.refiner.train_convolutional --foreseen .data/prediction/foreseen \\
         --sets pushing collages --out .data/runs/prediction-refiner
 
-Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Figures are PSNR of held-out clips, dB, by frames
-ahead: `network H`, beside the picture that it changes (the last frame, or what is foreseen), `base H`.
+Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Metrics are PSNR of held-out clips, dB, by frames
+ahead: `network H`, beside the image that it changes (the last frame, or what is foreseen), `base H`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Training(run.Training):
         """One step on `count` frames at random, at that learning rate. foreseen uint8 [N, T, horizons, 64, 64, 3]: what
         is changed, instead of the last frame, where the network sees it.
 
-        The loss is the squared error by that of the picture that is changed: hard clips and far times would have nearly
+        The loss is the squared error by that of the image that is changed: hard clips and far times would have nearly
         all of a plain one.
         """
         device, total = self.device, clips.frames.shape[1]

@@ -1,4 +1,4 @@
-"""Cameras rotated upright, and pictures warped from one to another that differs by frame and roll."""
+"""Cameras rotated upright, and images warped from one to another that differs by frame and roll."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FAINTEST = 0.05  # where the world's up is nearly along the axis, the rotation f
 
 
 def rotated_upright(camera: Camera, up: np.ndarray) -> Camera:
-    """The camera rotated about its optical axis so that `up` [3] of the world points up in the picture.
+    """The camera rotated about its optical axis so that `up` [3] of the world points up in the image.
 
     Section 3.2 of NPBG++ (arXiv 2203.13318), as the SDK's `rotated_upright`: as it is where up is along the axis, and
     continuous near that.
@@ -30,7 +30,7 @@ def rotated_upright(camera: Camera, up: np.ndarray) -> Camera:
 
 
 def upright(camera: Camera, up: np.ndarray, multiple: int) -> Camera:
-    """The camera rotated upright, with the smallest frame that holds its whole picture and has sides that are multiples
+    """The camera rotated upright, with the smallest frame that holds its whole image and has sides that are multiples
     of `multiple`. The paper rotates inside of a square as wide as the diagonal: up to twice the pixels."""
     rotated = rotated_upright(camera, up)
     right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
@@ -50,16 +50,16 @@ def between(source: Camera, target: Camera) -> np.ndarray:
 
 
 def moves(source: Camera, target: Camera) -> bool:
-    """Whether a corner of the picture is elsewhere in the other one, by more than interpolation shows (1/64 pixel)."""
+    """Whether a corner of the image is elsewhere in the other one, by more than interpolation shows (1/64 pixel)."""
     right, bottom = source.width_px, source.height_px
     corners = np.array([[0, 0, 1], [right, 0, 1], [0, bottom, 1], [right, bottom, 1]], np.float64)
     return bool(np.abs(corners @ between(source, target).T - corners[:, :2]).max() > 1 / 64)
 
 
 def warped(image: np.ndarray, source: Camera, target: Camera, outside: int = cv2.BORDER_REPLICATE) -> np.ndarray:
-    """The picture that `source` took, as `target` would have (see `between`); bilinear. image: [H, W] or [H, W, C].
+    """The image that `source` took, as `target` would have (see `between`); bilinear. image: [H, W] or [H, W, C].
 
-    Beyond the border the last pixels are repeated: an edge between picture and black would be a feature.
+    Beyond the border the last pixels are repeated: an edge between image and black would be a feature.
     """
     size = target.width_px, target.height_px
     return cv2.warpAffine(image, between(source, target), size, flags=cv2.INTER_LINEAR, borderMode=outside)

@@ -6,7 +6,7 @@ One pixel a point; the nearest is visible, of equal depths the lowest index, by 
 Coarser levels are the smallest keys of 2x2 pixels of the next finer one. That is what a camera of half the size would
 find, and exactly: a point at (x, y) is in pixel floor(x + 1/2), and half the size moves it to (x + 1/2) / 2 - 1/2, so
 to pixel floor((x + 1/2) / 2) = floor(floor(x + 1/2) / 2). It holds where all sides can be halved, hence sides are
-multiples of 16 here: the frame is wider than the picture by up to 15 pixels, with the points that are there, and
+multiples of 16 here: the frame is wider than the image by up to 15 pixels, with the points that are there, and
 cropped afterwards. The paper truncates sizes instead and draws the points five times. A point that is dropped as
 occluded (`without_occluded`) is never the visible one of a coarser pixel that has another point of its block.
 """
@@ -117,7 +117,7 @@ def pyramid(keys: Tensor, levels: int) -> Pyramid:
 
 def filled(rasters: list[Tensor], background: Tensor) -> list[Tensor]:
     """Rasters [..., 9, H/2^k, W/2^k], finest first, as a refiner wants them: where a pixel has no point its colours are
-    those of the next coarser raster, in the coarsest `background` [3], so that the finest holds a picture. Occupancy
+    those of the next coarser raster, in the coarsest `background` [3], so that the finest holds an image. Occupancy
     and learnt features stay 0 there."""
     below, found = background[:, None, None].to(rasters[-1]), []
     for raster in reversed(rasters):

@@ -1,4 +1,4 @@
-"""Which photos a picture is made of while training: NPBG++ draws them by how well they see the same from aside."""
+"""Which photos an image is made of while training: NPBG++ draws them by how well they see the same from aside."""
 
 from __future__ import annotations
 

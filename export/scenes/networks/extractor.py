@@ -1,7 +1,7 @@
 """The feature extractor of NPBG++ (arXiv 2203.13318): a U-Net from a photo to 8 features a pixel.
 
 The first three are the photo's own red, green and blue, as they are: so a scene has colours without a network, the
-refiner starts from a picture instead of from nothing, and no bit of 8 is lost on what is known. Five are learnt.
+refiner starts from an image instead of from nothing, and no bit of 8 is lost on what is known. Five are learnt.
 The trunk is the MobileNetV2 that the dense pose network has too, since there are weights for it that may be shipped
 (export.teachers.backbone); the paper's has a similar size.
 """

@@ -1,4 +1,4 @@
-"""Gives the learnt features the range of the colours, in networks that compute the same pictures.
+"""Gives the learnt features the range of the colours, in networks that compute the same images.
 
 Features are scaled in the extractor's last layer and back in those of the refiner that read rasters; what lies between,
 a regression for each point, is linear in them. Eight bits hold all channels of a raster with one scale: beside features
@@ -50,7 +50,7 @@ def factors_between(networks: Networks, image: Tensor, features: Tensor) -> Tens
 
 @torch.no_grad()
 def scaled(networks: Networks, factors: Tensor) -> Networks:
-    """A copy whose learnt features are `factors` [5] times as large and whose pictures are the same.
+    """A copy whose learnt features are `factors` [5] times as large and whose images are the same.
 
     Raises ValueError for the paper's refiner: its borders and gates are not made for 8 bits either.
     """

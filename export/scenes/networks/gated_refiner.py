@@ -1,4 +1,4 @@
-"""The refiner of NPBG++ (arXiv 2203.13318): a gated U-Net from point rasters at five scales to a picture."""
+"""The refiner of NPBG++ (arXiv 2203.13318): a gated U-Net from point rasters at five scales to an image."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """A refiner for two CPU cores: a U-Net that begins and ends at half resolution.
 
-What the gated one does, cheaper: the finest raster comes in as four pixels for one and the picture goes out so, hence
+What the gated one does, cheaper: the finest raster comes in as four pixels for one and the image goes out so, hence
 nothing but copying is done at full resolution, where the gated one spends a third of its multiply-adds; ReLU instead of
 two convolutions, ELU and a sigmoid, so that convolution and activation are one int8 operation; zeros around the
 borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
 convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
 
 What the network computes is added to the colours of the finest raster (`export.scenes.geometry.raster.filled`):
-training starts from a picture, and what is rounded to 8 bits is the difference alone.
+training starts from an image, and what is rounded to 8 bits is the difference alone.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class LightRefiner(nn.Module):
         return self.of_rearranged(rasters)
 
     def of_rearranged(self, rasters: list[Tensor]) -> Tensor:
-        """As `forward`, but with space_to_depth the first raster comes and the picture leaves rearranged."""
+        """As `forward`, but with space_to_depth the first raster comes and the image leaves rearranged."""
         count = 2 if self.config.space_to_depth else 1
         skips = [self.start(torch.cat(rasters[:count], 1) if count > 1 else rasters[0])]
         for block, raster in zip(self.down, rasters[count : self.config.levels], strict=True):

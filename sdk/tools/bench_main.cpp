@@ -255,7 +255,8 @@ int main(int argc, char** argv) try {
   CLI::Option* const predict = app.add_flag(
       "--predict", predicts,
       "Measure prediction instead of dense pose: novelty of a frame, the next frame by each method, and samples");
-  app.add_option("--json", options.json, "Also write everything to this file (docs/formats.md, \"Benchmarks\")");
+  app.add_option("--json", options.json,
+                 "Also write everything to this file (docs/reference/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
   for (const char* of_dense_pose : {"--no-spin", "--provider", "--size", "--threshold", "--max-proposals",
                                     "--key-frames", "--min-person-height", "--crops", "--crop-size", "--no-surface"}) {

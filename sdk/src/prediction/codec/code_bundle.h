@@ -1,4 +1,4 @@
-// A bundle of the task "prediction" (docs/formats.md): the encoder, the decoder, and the codebook.
+// A bundle of the task "prediction" (docs/reference/formats.md): the encoder, the decoder, and the codebook.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// The code file of a bundle (.maqc, docs/formats.md): the codebook and the probabilities of its codes. Written by
-// export/prediction/code_file.py.
+// The code file of a bundle (.maqc, docs/reference/formats.md): the codebook and the probabilities of its codes.
+// Written by export/prediction/code_file.py.
 #pragma once
 
 #include <cstddef>

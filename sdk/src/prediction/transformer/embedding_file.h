@@ -1,5 +1,5 @@
-// The embedding file of a bundle (.maqr, docs/formats.md): tables that are looked up around the transformer's graphs.
-// Written by export/prediction/graphs/transformer_file.py.
+// The embedding file of a bundle (.maqr, docs/reference/formats.md): tables that are looked up around the transformer's
+// graphs. Written by export/prediction/graphs/transformer_file.py.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// The transformer of a prediction bundle (docs/formats.md): its graphs and tables.
+// The transformer of a prediction bundle (docs/reference/formats.md): its graphs and tables.
 #pragma once
 
 #include <cstdint>

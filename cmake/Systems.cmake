@@ -19,7 +19,7 @@ set(MAQ_SCENES_FOLDERS scene)
 set(MAQ_SCENES_MODELS scenes-int8)
 set(MAQ_SCENES_API "scene/.*")
 set(MAQ_SCENES_HEADERS "(capture|scene).*")
-set(MAQ_SCENES_EXPORTS "maq_(capture|scene)_.*")
+set(MAQ_SCENES_EXPORTS "maq_(capture|scene)_.*|maq_image_get_scene_stats")
 
 set(MAQ_EDGES_FOLDERS edges)
 set(MAQ_EDGES_MODELS edges-int8)

@@ -35,10 +35,10 @@ class DrawnMesh:
     scene: Scene
 
     @staticmethod
-    def of(mesh: HeadMesh) -> DrawnMesh:
-        """Returns the mesh with its texture if it has one, otherwise with its vertex colours."""
+    def of(mesh: HeadMesh, with_texture: bool = True) -> DrawnMesh:
+        """Returns the mesh with its texture, if it has one and with_texture is true, or with its vertex colours."""
         faces = mesh.triangles.astype(np.int64)
-        textured = mesh.texture_jpeg is not None
+        textured = with_texture and mesh.texture_jpeg is not None
         of_vertices = (mesh.texture_coordinates if textured else mesh.colours).astype(np.float64)
         texture = cv2.imdecode(np.frombuffer(mesh.texture_jpeg, np.uint8), cv2.IMREAD_COLOR_RGB) if textured else None
 

@@ -15,7 +15,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -172,8 +172,7 @@ def measure_views(painter: Painter, case: Case, known_focal: bool = False) -> di
     except MaquetteError:
         return {}
     to_mesh = aligned(triangles_of(mesh), case.head.true.points)
-    without = replace(mesh, texture_jpeg=None, texture_coordinates=None)
-    coloured = case.view_errors(DrawnMesh.of(without), to_mesh)
+    coloured = case.view_errors(DrawnMesh.of(mesh, with_texture=False), to_mesh)
     return case.view_errors(DrawnMesh.of(mesh), to_mesh) | {f"coloured_{key}": value for key, value in coloured.items()}
 
 
@@ -291,7 +290,7 @@ def run(options: argparse.Namespace) -> dict:
         mean, others = read_mean_head(bundle), baselines_of(options, bundle, maker) if not number else NOTHING_ELSE
         with (
             HeadBuilder(bundle, threads=options.threads) as builder,
-            HeadBuilder(bundle, threads=options.threads, texture_px=TEXTURE_PX) as of_textures,
+            HeadBuilder(bundle, texture=True, threads=options.threads, texture_px=TEXTURE_PX) as of_textures,
         ):
             painter = Painter(of_textures, options.at) if not number else None
             for own in sets:

@@ -110,7 +110,7 @@ def _real_parts(rows: Sequence[Mapping], at_s: float) -> list[str]:
 
 
 def _program_parts(rows: Sequence[Mapping]) -> list[str]:
-    stages = ("look", "pose", "fit", "mesh")
+    stages = ("encode", "pose", "fit", "mesh")
     lines = [
         [row["what"], f"{row['seconds']:.2f}", *(f"{row['ms'][stage]:.0f}" for stage in stages),
          f"{row['peak_mb']:.0f}", f"{row['glb_mb']:.2f}", f"{row['maqh_kb']:.0f}"]

@@ -37,7 +37,7 @@ int main(int argc, char** argv) try {
     maq::head::HeadRenderOptions options;
     options.threads = threads, options.is_smooth = is_smooth;
     maq::head::HeadRenderer renderer(mesh, std::nullopt, options);
-    maq::head::HeadPicture picture;
+    maq::RenderedImage picture;
     std::vector<double> ms;
     std::clock_t before = 0;
     for (int i = 0; i <= kPictures; ++i) {

@@ -82,8 +82,7 @@ void measure(const char* name, maq::SceneRenderer& renderer, Kind kind, int widt
   maq::RenderedImage picture;
   std::vector<maq::RenderCounts> all;
   for (int frame = 0; frame <= frames; ++frame) {
-    renderer.render(camera_of(kind, width, height, 0.05 * frame, roll), picture);
-    all.push_back(picture.counts);
+    all.push_back(renderer.render(camera_of(kind, width, height, 0.05 * frame, roll), picture));
   }
   std::printf("%-14s first %6.1f |", name, all[0].all_ms);
   for (const auto& [title, figure] : figures) {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from benchmarks.scenes.command import STAGES
-from benchmarks.scenes.settings import savings
 from benchmarks.scenes.speed import memory_a_point
 
 SHIPPED = "as shipped"
@@ -123,9 +122,8 @@ def saving_rows(rows: list[dict]) -> list[list[str]]:
     found = {row["setting"]: row["rendered"] for row in rows}
     table = [["saving", "bytes a point", "a frame, ms", "error, dB"]]
     shipped = found.get(SHIPPED)
-    named = [(setting.name, said) for setting, said in savings()]
-    named[0:0] = [("every descriptor varies", "descriptors that do not vary keep their mean"),
-                  ("coefficients of 32 bits", "coefficients of few bits")]  # fmt: skip
+    named = [("every descriptor varies", "descriptors that do not vary keep their mean"),
+             ("coefficients of 32 bits", "coefficients of few bits")]  # fmt: skip
     for setting, said in named:
         metrics = found.get(setting)
         if shipped and metrics:

@@ -76,14 +76,4 @@ def settings(bundles: Sequence[str]) -> list[Setting]:
     made.append(Setting("means alone", "view dependence", build=(*all_points, "--min-variation", CONSTANT)))
     made.append(Setting("every descriptor varies", "view dependence", build=(*all_points, "--min-variation", "0")))
     made += [Setting(f"fine-tuned {said}", "fine-tuned", tuned=name) for name, said in TUNED.items()]
-    return made + [setting for setting, _ in savings()]
-
-
-def savings() -> list[tuple[Setting, str]]:
-    """Returns settings that do skippable work, with the name of the optimisation that skips it. Two more are among
-    `settings`: "every descriptor varies" and "coefficients of 32 bits"."""
-    axis = "not needed"
-    return [
-        (Setting("no block is culled", axis, render=("--without", "culling")), "blocks out of sight are left out"),
-        (Setting("all tiles are refined", axis, render=("--without", "tiles")), "tiles without points are not refined"),
-    ]
+    return made

@@ -32,12 +32,11 @@ void HeadView::fit(maquette::LiveHeadPhoto photo, bool adds_photo) {
 }
 
 void HeadView::export_head(maquette::Saver& saver) const {
-  const auto head = live_.head();
-  saver.run([head, path = saver.new_path(".glb")] {
-    if (head == nullptr) return std::string("There is no head to be exported yet.");
-    head->export_mesh(path);
+  saver.run([fitted = live_.fitted(), path = saver.new_path(".glb")] {
+    if (fitted == nullptr) return std::string("There is no head to be exported yet.");
+    fitted->mesh.save(path);
     const std::string kept = path.substr(0, path.rfind('.')) + ".maqh";
-    head->save(kept);
+    fitted->head->save(kept);
     return "Saved " + path + " and " + kept;
   });
 }
@@ -58,7 +57,7 @@ void HeadView::upload() {
 
 Action HeadView::press(int key) {
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_5) {
-    wanted_.shading = maq_head_shading(key - GLFW_KEY_1 + int(MAQ_HEAD_SHADING_COLOUR));
+    wanted_.shading = maq_head_shading(key - GLFW_KEY_1);
     needs_image_ = true;
   }
   if (key == GLFW_KEY_C) wanted_.is_over_photo = !wanted_.is_over_photo, needs_image_ = true;
@@ -129,10 +128,10 @@ std::string HeadView::message() const {
 }
 
 maquette::Saver::Companions HeadView::companions() const {
-  const auto head = live_.head();
-  if (head == nullptr) return nullptr;
-  return [head](const std::string& folder, const std::string& stem) {
-    head->export_mesh(folder + "/" + stem + ".glb");
+  const auto fitted = live_.fitted();
+  if (fitted == nullptr) return nullptr;
+  return [fitted](const std::string& folder, const std::string& stem) {
+    fitted->mesh.save(folder + "/" + stem + ".glb");
     return ".glb";
   };
 }
@@ -203,7 +202,7 @@ void HeadView::draw_choices() {
   ImGui::TextUnformatted("Shading (1 to 5)");
   for (size_t i = 0; i < kShadingNames.size(); ++i) {
     if (i % 3 != 0) ImGui::SameLine(float(i % 3) * 100 * window_.scale());
-    const auto shading = maq_head_shading(i + size_t(MAQ_HEAD_SHADING_COLOUR));
+    const auto shading = maq_head_shading(i);
     if (ImGui::RadioButton(kShadingNames[i], wanted_.shading == shading))
       wanted_.shading = shading, needs_image_ = true;
   }

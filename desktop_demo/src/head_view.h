@@ -14,7 +14,7 @@ class HeadView final : public MainView {
 
   // `adds_photo`: to those of the head so far.
   void fit(maquette::LiveHeadPhoto photo, bool adds_photo);
-  bool has_head() const { return live_.head() != nullptr; }
+  bool has_head() const { return live_.fitted() != nullptr; }
   // The mesh as .glb and the head as .maqh, into the saver's folder.
   void export_head(maquette::Saver& saver) const;
 

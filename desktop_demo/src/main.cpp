@@ -139,8 +139,8 @@ int main(int argc, char** argv) try {
   options.view = View(std::find(kViewNames.begin(), kViewNames.end(), view) - kViewNames.begin());
   const auto& layers = maquette::kEdgeLayerNames;
   options.layer = maquette::EdgeLayer(std::find(layers.begin(), layers.end(), layer) - layers.begin());
-  options.shading = maq_head_shading(std::find(kShadingNames.begin(), kShadingNames.end(), shading) -
-                                     kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
+  options.shading =
+      maq_head_shading(std::find(kShadingNames.begin(), kShadingNames.end(), shading) - kShadingNames.begin());
   options.prediction.ahead_s = ahead_ms / 1e3;
   options.prediction.method =
       maq_predictor_method(std::find(kMethodNames.begin(), kMethodNames.end(), method) - kMethodNames.begin());

@@ -33,7 +33,7 @@ bool SceneView::update() {
   if (!live_.images().take()) return false;
   ++image_count_;
   set_images();
-  const maq_scene_image_stats& s = image().stats;
+  const maq_scene_render_stats& s = image().stats;
   stages_.add({s.project_ms, s.shade_ms, s.refine_ms, s.resample_ms});
   return true;
 }

@@ -13,7 +13,6 @@ from maquette.fusion import EdgesFusion
 from maquette.heads import (
     Head,
     HeadBuilder,
-    HeadImage,
     HeadInfo,
     HeadLandmark,
     HeadMesh,
@@ -21,15 +20,16 @@ from maquette.heads import (
     HeadRenderer,
     MorphTarget,
 )
+from maquette.images import Image
 from maquette.native import MaquetteError, library_path, native
 from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
-from maquette.scenes import Capture, PinholeCamera, Scene, SceneImage, SceneRenderer, View
+from maquette.scenes import Capture, PinholeCamera, Scene, SceneRenderer, View
 
 __all__ = [
     "Box", "Camera", "Capture", "Concealer", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
-    "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadImage", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person",
-    "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneImage", "SceneRenderer", "Source", "View",
+    "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
+    "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person",
+    "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneRenderer", "Source", "View",
     "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
 ]  # fmt: skip
 

@@ -1,11 +1,12 @@
-"""Heads: a 3D head, closed, coloured and in metres, from one photo of a person or several.
+"""Heads: a closed, coloured 3D head in metres, from one photo of a person or from several.
 
-A face is biometric data: ask the person, and keep heads as you would keep passwords (docs/heads.md). Points of a head
+A face is biometric data: ask the person, and protect heads like passwords (docs/guide/head.md). Points of a head
 are in metres: x to the person's left, y to the back of the head, z up, the origin in its middle.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from maquette.frames import Frame, as_frame
+from maquette.images import Image, rendered
 from maquette.native import NativeObject, ProgressCallback, native
 from maquette.scenes import PinholeCamera
 
@@ -25,14 +27,14 @@ _ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
 
 @dataclass(frozen=True)
 class HeadPhoto:
-    """What was found of a photo. box_px: in which the head was seen, given or found: left, top, right, bottom, the
-    latter two exclusive. head_fraction: how much of the box's surroundings the network sees as head, 0 to 1. The rest
-    is of the latest fit, and 0 before. is_used: whether the head was fitted to it; a photo without a head, or with
-    another one than the other photos, is left out. focal_px: of the camera, given or estimated. rms_px: root mean
-    square distance of points of the head from where the network saw them."""
+    """What was found in a photo. box_px: of the head, given or detected: left, top, right, bottom; right and bottom are
+    exclusive. head_coverage: fraction of the encoder's crop that shows the head, 0 to 1. The other fields describe the
+    latest fit, and are 0 before. is_used: whether the head was fitted to the photo; photos without a head or of a
+    different person are rejected. focal_px: focal length, given or estimated. rms_px: root mean square distance of head
+    points from where the network saw them."""
 
     box_px: tuple[float, float, float, float]
-    head_fraction: float
+    head_coverage: float
     is_used: bool
     focal_px: float
     rms_px: float
@@ -40,9 +42,9 @@ class HeadPhoto:
 
 @dataclass(frozen=True)
 class HeadInfo:
-    """photo_count: photos that the head was fitted to. scale: where its size is from: "prior" (heads are that large on
-    average: photos alone do not tell), "given" (a known distance) or "depth" (a depth camera). scale_sigma: standard
-    deviation of its size, as a fraction of it; 0: not known. texture_px: pixels a side; 0: it has no texture."""
+    """photo_count: photos that the head was fitted to. scale: where its size comes from: "prior" (the average of heads:
+    photos alone do not tell), "given" (a known distance) or "depth" (a depth camera). scale_sigma: standard deviation
+    of the size, as a fraction of it; 0: unknown. texture_px: pixels a side; 0: no texture."""
 
     photo_count: int
     scale: str
@@ -52,9 +54,8 @@ class HeadInfo:
 
 @dataclass(frozen=True, eq=False)
 class HeadLandmark:
-    """A place that has a name. point_m: float64 [3]. sigma_m: standard deviation of each coordinate that the shape
-    model and the photos leave: more where they do not show it, or along their lines of sight; that of the size comes
-    on top."""
+    """A named point. point_m: float64 [3]. sigma_m: standard deviation of each coordinate, by shape model and photos.
+    It is larger where no photo shows the point, and along the lines of sight. The deviation of the size is extra."""
 
     point_m: np.ndarray
     sigma_m: float
@@ -62,43 +63,99 @@ class HeadLandmark:
 
 @dataclass(frozen=True, eq=False)
 class MorphTarget:
-    """How vertices move in a facial action at its strongest: to position + weight * move, with weights of 0 to 1.
+    """A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1.
 
-    name: one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's. vertices: uint32 [N], increasing;
-    all others stay. moves_m: float32 [N, 3].
+    name: one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's left. vertices: uint32 [N],
+    increasing; all others stay. deltas_m: float32 [N, 3].
     """
 
     name: str
     vertices: np.ndarray
-    moves_m: np.ndarray
+    deltas_m: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class HeadMesh:
-    """A mesh of V vertices and F triangles, cut off below the chin, and closed but for the template's topology.
+class HeadMesh(NativeObject):
+    """The surface of a head as a mesh of V vertices and F triangles: `Head.mesh`. It ends below the chin, and is closed
+    except with the template's topology. Arrays are copied at the first use and stay valid after `close`."""
 
-    positions_m: float32 [V, 3]. normals: float32 [V, 3], outwards, of length 1. colours: uint8 [V, 3], sRGB.
-    template_points_m: float32 [V, 3], where each vertex lies on the template head, which is the same place (the tip of
-    the nose, say) on every head. triangles: uint32 [F, 3], counter-clockwise seen from outside. simplification_error_m:
-    the largest distance of a vertex of the full mesh from this one. texture_coordinates: float32 [V, 2], u to the
-    right and v down, 0 to 1. texture_jpeg: a JPEG file, square; `Frame.decode` reads it. Both are None where the head
-    has no texture; where it has one, vertices around the cut are there twice. With the template's topology there are
-    coordinates without a texture, and morph_targets; vertices at seams of the texture are there twice.
-    """
+    @property
+    def _data(self) -> Any:
+        """Its pointers are valid until `close`. Raises MaquetteError afterwards."""
+        data = native().sized("maq_head_mesh_data")
+        native().call("maq_head_mesh_get_data", self.handle, data)
+        return data
 
-    positions_m: np.ndarray
-    normals: np.ndarray
-    colours: np.ndarray
-    template_points_m: np.ndarray
-    triangles: np.ndarray
-    simplification_error_m: float = 0.0
-    texture_coordinates: np.ndarray | None = None
-    texture_jpeg: bytes | None = None
-    morph_targets: tuple[MorphTarget, ...] = ()
+    def _copied(self, pointer: Any, shape: tuple[int, ...], kind: type) -> np.ndarray:
+        size = int(np.prod(shape)) * np.dtype(kind).itemsize
+        return np.frombuffer(native().ffi.buffer(pointer, size), kind).reshape(shape).copy()
+
+    @functools.cached_property
+    def positions_m(self) -> np.ndarray:
+        """float32 [V, 3]."""
+        return self._copied(self._data.positions_m, (self._data.vertex_count, 3), np.float32)
+
+    @functools.cached_property
+    def normals(self) -> np.ndarray:
+        """float32 [V, 3], outwards, of length 1."""
+        return self._copied(self._data.normals, (self._data.vertex_count, 3), np.float32)
+
+    @functools.cached_property
+    def colours(self) -> np.ndarray:
+        """uint8 [V, 3], sRGB."""
+        return self._copied(self._data.colours_rgb, (self._data.vertex_count, 3), np.uint8)
+
+    @functools.cached_property
+    def template_points_m(self) -> np.ndarray:
+        """float32 [V, 3]: the point of the template head. Equal points mean the same part of every head, such as the
+        tip of the nose."""
+        return self._copied(self._data.template_points_m, (self._data.vertex_count, 3), np.float32)
+
+    @functools.cached_property
+    def triangles(self) -> np.ndarray:
+        """uint32 [F, 3], counter-clockwise seen from outside."""
+        return self._copied(self._data.triangles, (self._data.triangle_count, 3), np.uint32)
+
+    @functools.cached_property
+    def texture_coordinates(self) -> np.ndarray | None:
+        """float32 [V, 2], u to the right and v down, 0 to 1. None without a texture, except with the template's
+        topology. Vertices at seams appear twice."""
+        if self._data.texture_coordinates == native().ffi.NULL:
+            return None
+        return self._copied(self._data.texture_coordinates, (self._data.vertex_count, 2), np.float32)
+
+    @functools.cached_property
+    def texture_jpeg(self) -> bytes | None:
+        """A square JPEG file, which `Frame.decode` reads. None without a texture, and with the template's topology."""
+        if self._data.texture_bytes == 0:
+            return None
+        return bytes(native().ffi.buffer(self._data.texture_jpeg, self._data.texture_bytes))
+
+    @functools.cached_property
+    def morph_targets(self) -> tuple[MorphTarget, ...]:
+        """Facial actions, with the template's topology."""
+        n, count = native(), self._data.morph_target_count
+        return tuple(
+            MorphTarget(
+                n.ffi.string(target.name).decode(),
+                self._copied(target.vertices, (target.vertex_count,), np.uint32),
+                self._copied(target.deltas_m, (target.vertex_count, 3), np.float32),
+            )
+            for target in n.indexed("maq_head_mesh_get_morph_target", self.handle, "maq_head_morph_target", count)
+        )
+
+    @property
+    def simplification_error_m(self) -> float:
+        """The largest distance of a vertex of the full mesh from this mesh."""
+        return self._data.simplification_error_m
+
+    def save(self, path: str | Path) -> None:
+        """Writes the mesh for other programs: .glb, .obj with a .mtl beside it, or .ply. GLB and OBJ have the texture,
+        GLB also the morph targets. In files x is to the person's left, y up, z to the front. Raises MaquetteError."""
+        native().call("maq_head_mesh_save", self.handle, str(path).encode())
 
 
 class Head(NativeObject):
-    """One head, of `HeadBuilder.fit` or `Head.open("head.maqh")`. It holds no photo; a texture has the face's
+    """One head, from `HeadBuilder.fit` or `Head.open("head.maqh")`. It holds no photo, but a texture has the face's
     pixels."""
 
     @staticmethod
@@ -111,19 +168,19 @@ class Head(NativeObject):
         return Head(n.create("maq_head", n.context, str(file).encode(), function="maq_head_open"))
 
     def scaled_by_distance(self, start: str, end: str, distance_m: float) -> Head:
-        """The same head, of the size at which the two places (see `landmark`) are `distance_m` apart (0.001 to 10),
-        such as pupil_left and pupil_right by what an optician measured. Raises MaquetteError."""
+        """Copies the head with the size at which two landmarks are `distance_m` apart (0.001 to 10), such as pupil_left
+        and pupil_right as an optician measured them. Raises MaquetteError."""
         names = start.encode(), end.encode()
         arguments = ("maq_head", self.handle, *names, float(distance_m))
         return Head(native().create(*arguments, function="maq_head_scale_by_distance"))
 
     def scaled_by_depth(self, depth: Frame | np.ndarray, camera: int = 0) -> Head:
-        """The same head, of the size at which it lies where a depth camera saw it.
+        """Copies the head with the size at which it fits a depth image.
 
         depth: of the same view as the photo with this camera, in any size: a Frame that is depth or has depth, float32
-        [H, W] in metres or uint16 [H, W] in millimetres. The photo should have been given its focal_px: an estimated
-        one that is 10 % too long makes the head as much too small. Raises MaquetteError, with the status
-        MAQ_ERROR_NOT_FOUND where half of the head has no depth that agrees with it.
+        [H, W] in metres or uint16 [H, W] in millimetres. Give that photo its focal_px: an
+        estimate that is 10 % too long makes the head 10 % too small. Raises MaquetteError, with the status
+        MAQ_ERROR_NOT_FOUND if half of the head has no depth that agrees with it.
         """
         frame = as_frame(depth)
         arguments = ("maq_head", self.handle, camera, frame.handle)
@@ -133,14 +190,6 @@ class Head(NativeObject):
         """Writes a head file (.maqh), some 64 KB and the texture, atomically. Raises MaquetteError."""
         native().call("maq_head_save", self.handle, str(path).encode())
 
-    def export(self, path: str | Path, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
-               bundle: str | Path | None = None) -> None:  # fmt: skip
-        """Writes its mesh for other programs: .glb, .obj with a .mtl beside it, or .ply; the first two have the
-        texture, the first has morph targets. In files x is to the person's left, y up, z to the front. Options: as of
-        `mesh`. Raises MaquetteError."""
-        options = _mesh_options(triangle_count, cell_m, topology, bundle)
-        native().call("maq_head_export", self.handle, str(path).encode(), options)
-
     @property
     def info(self) -> HeadInfo:
         info = native().sized("maq_head_info")
@@ -149,90 +198,84 @@ class Head(NativeObject):
 
     def mesh(self, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
              bundle: str | Path | None = None) -> HeadMesh:  # fmt: skip
-        """The surface, made in a second or less; the same again costs nothing.
+        """Makes a mesh of the surface, in a second or less.
 
-        triangle_count: about as many, 100 or more, or "all"; 0: 60,000, or all where there is a cell_m. cell_m:
-        distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0016, or 0.0021 where no more
-        than 60,000 triangles are to be left. topology: "field", the surface as it is, or "template": vertices,
-        triangles and texture coordinates are the same for every head, with facial actions; triangle_count and cell_m
-        are 0 then. bundle: folder of the bundle whose template it is, for a
-        head from a file; default: the installed one. Raises MaquetteError.
+        triangle_count: about this many, 100 or more, or "all"; 0: 60,000, or all if cell_m is given. cell_m: distance
+        between neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0021, or 0.0016 for more than 60,000
+        triangles. topology: "field", the surface itself, or "template": vertices, triangles and texture coordinates are
+        the same for every head, with facial actions; triangle_count and cell_m are then 0. bundle: folder of the bundle
+        with the template, for a head from a file; default: the installed one. Raises MaquetteError.
         """
+        if isinstance(triangle_count, str):
+            if triangle_count != "all":
+                raise ValueError(f'triangle_count is "{triangle_count}"; it is a number or "all"')
+            triangle_count = _ALL_TRIANGLES
+        if topology not in TOPOLOGIES:
+            raise ValueError(f'topology is "{topology}"; it is one of {", ".join(TOPOLOGIES)}')
+        settings = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": TOPOLOGIES.index(topology)}
+        if bundle is not None:
+            settings["bundle_path"] = bundle
         n = native()
-        mesh = n.sized("maq_head_mesh")
-        n.call("maq_head_get_mesh", self.handle, _mesh_options(triangle_count, cell_m, topology, bundle), mesh)
-
-        def copied(pointer: Any, shape: tuple[int, ...], kind: type) -> np.ndarray:
-            size = int(np.prod(shape)) * np.dtype(kind).itemsize
-            return np.frombuffer(n.ffi.buffer(pointer, size), kind).reshape(shape).copy()
-
-        def morph_target(index: int) -> MorphTarget:
-            target = n.sized("maq_head_morph_target")
-            n.call("maq_head_get_morph_target", self.handle, index, target)
-            return MorphTarget(
-                n.ffi.string(target.name).decode(),
-                copied(target.vertices, (target.vertex_count,), np.uint32),
-                copied(target.moves_m, (target.vertex_count, 3), np.float32),
-            )
-
-        vertices = mesh.vertex_count
-        has_texture, has_coordinates = mesh.texture_bytes > 0, mesh.texture_coordinates != n.ffi.NULL
-        return HeadMesh(
-            copied(mesh.positions_m, (vertices, 3), np.float32),
-            copied(mesh.normals, (vertices, 3), np.float32),
-            copied(mesh.colours_rgb, (vertices, 3), np.uint8),
-            copied(mesh.template_points_m, (vertices, 3), np.float32),
-            copied(mesh.triangles, (mesh.triangle_count, 3), np.uint32),
-            mesh.simplification_error_m,
-            copied(mesh.texture_coordinates, (vertices, 2), np.float32) if has_coordinates else None,
-            bytes(n.ffi.buffer(mesh.texture_jpeg, mesh.texture_bytes)) if has_texture else None,
-            tuple(morph_target(index) for index in range(mesh.morph_target_count)),
-        )
+        return HeadMesh(n.create("maq_head_mesh", self.handle, n.config("maq_head_mesh_config", settings)))
 
     def landmark(self, name: str) -> HeadLandmark:
-        """A place by its name: nose_tip, nose_bridge, chin, crown, pupil_left, pupil_right, temple_left, temple_right,
-        ear_top_left, ear_top_right, ear_bottom_left, ear_bottom_right; left is the person's. Raises MaquetteError."""
+        """A landmark by its name: nose_tip, nose_bridge, chin, crown, pupil_left, pupil_right, temple_left,
+        temple_right, ear_top_left, ear_top_right, ear_bottom_left, ear_bottom_right; left is the person's. Raises
+        MaquetteError."""
         n = native()
         found = n.sized("maq_head_landmark")
         n.call("maq_head_get_landmark", self.handle, name.encode(), found)
         return HeadLandmark(np.array(list(found.point_m)), found.sigma_m)
 
     def landmarks(self) -> dict[str, HeadLandmark]:
-        """All places that this head has, by their names."""
+        """All landmarks of this head, by their names."""
         n, handle, names = native(), self.handle, []
         while name := n.lib.maq_head_get_landmark_name(handle, len(names)):
             names.append(n.ffi.string(name).decode())
         return {name: self.landmark(name) for name in names}
 
     def camera(self, index: int = 0) -> PinholeCamera:
-        """Of a photo that the head was fitted to (`HeadPhoto.is_used`), in the order they were added: what
-        `HeadRenderer.run` draws with it lies on the head in the photo. Raises MaquetteError."""
+        """The camera of a photo that the head was fitted to (`HeadPhoto.is_used`), in the order of `add_photo`. An
+        image of `HeadRenderer.run` with it lies on the head in the photo. Raises MaquetteError."""
         n = native()
         camera = n.sized("maq_pinhole_camera")
         n.call("maq_head_get_camera", self.handle, index, camera)
         return PinholeCamera.of_struct(camera)
 
 
+class _FitProgress:
+    """The progress function of the fit that runs, for the callback that a builder has from its creation on."""
+
+    current: Callable[[float, str], bool | None] | None = None
+
+    def __call__(self, done: float, stage: str) -> bool | None:
+        return None if self.current is None else self.current(done, stage)
+
+
 class HeadBuilder(NativeObject):
-    """The network, loaded once, and photos of one person at a time.
+    """Fits heads to photos of one person at a time. The network is loaded once.
 
         builder = maquette.HeadBuilder()
         builder.add_photo(rgb)
         head = builder.fit(seconds=3)
-        head.export("head.glb")
+        head.mesh().save("head.glb")
 
-    bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
-    maq_head_config by their names: threads, provider, texture_px (256 to 2048; 0, the default, makes no texture),
-    texture_mirrored (what no photo sees of one side looks like the other), texture_unlit (the photos' light from one
-    side is taken out of the texture), ... The part of each photo around the head stays in memory until `clear` or
-    `close`. Raises MaquetteError.
+    bundle: a folder with manifest.json (default: the one in the package). texture: whether heads get a texture; None:
+    the SDK's choice, which is no texture in this version. settings: fields of maq_head_builder_config by their names:
+    threads, provider, texture_px (256 to 2048; default 1024), mirror_unseen, delight_texture, ... The part of each
+    photo around the head stays in memory until `clear` or `close`. Raises MaquetteError.
     """
 
-    def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:
+    def __init__(self, bundle: str | Path | None = None, texture: bool | None = None, **settings: Any) -> None:
         n = native()
         if bundle is not None:
             settings["bundle_path"] = Path(bundle)
-        super().__init__(n.create("maq_head_builder", n.context, n.config("maq_head_config", settings)))
+        if texture is not None:
+            settings["texture"] = n.lib.MAQ_HEAD_TEXTURE_ON if texture else n.lib.MAQ_HEAD_TEXTURE_OFF
+        self._progress = _FitProgress()
+        self._callback = ProgressCallback(self._progress)  # as long as the builder, which has its address
+        settings["progress_callback"] = self._callback.pointer
+        super().__init__(n.create("maq_head_builder", n.context, n.config("maq_head_builder_config", settings)))
 
     def add_photo(
         self,
@@ -241,20 +284,20 @@ class HeadBuilder(NativeObject):
         roll_rad: float = 0,
         focal_px: float | None = None,
     ) -> None:
-        """Looks at a photo; several must be of one person, each may have its own camera. `photos` has what was found.
+        """Encodes a photo. Several photos must show one person; each may have its own camera. See `photos`.
 
         image: a Frame, or uint8 [H, W, 3] RGB or [H, W] grey. box_px: of the head with its hair: left, top, right,
-        bottom (`Person.head_box_px` of dense pose will do); None: it is looked for, which finds it where it is alone
-        in the photo and not small. roll_rad: how far the head is turned in the photo's plane, clockwise from upright;
-        it need be right to some 30 degrees. focal_px: of the camera, in pixels of this photo; None: it is estimated.
-        Raises MaquetteError, with the status MAQ_ERROR_NOT_FOUND where there is no head; the builder stays as it was.
+        bottom (`Person.head_box_px` of dense pose works); None: it is detected, reliably only for one large head per
+        photo. roll_rad: rotation of the head in the photo's plane, clockwise from upright; exact to some 30 degrees is
+        enough. focal_px: focal length in pixels of this photo; None: it is estimated. Raises MaquetteError, with the
+        status MAQ_ERROR_NOT_FOUND if there is no head; the builder stays as it was.
         """
         n = native()
         settings: dict[str, Any] = {"roll_rad": roll_rad}
         if box_px is not None:
             settings["box_px"] = _numbers("box_px", box_px, "left, top, right, bottom")
             if not any(settings["box_px"]):  # to the C API it would mean that there is none
-                raise ValueError("box_px is 0, 0, 0, 0, which is empty; give the head's box, or None to look for it")
+                raise ValueError("box_px is 0, 0, 0, 0, which is empty; give the head's box, or None to detect it")
         if focal_px is not None:
             if focal_px == 0:
                 raise ValueError("focal_px is 0; give the focal length, or None to have it estimated")
@@ -263,169 +306,117 @@ class HeadBuilder(NativeObject):
         n.call("maq_head_builder_add_photo", self.handle, frame.handle, n.config("maq_head_photo", settings))
 
     def add_head(self, head: Head) -> None:
-        """Adds the photos of this builder to those that `head` was fitted to, which are not needed: later fits go on
-        from what they said. head: of the same person, fitted with the same bundle, such as one from a file; another
-        takes its place. Its cameras come first in the head that is fitted, and a size that was known stays. Raises
-        MaquetteError, with the status MAQ_ERROR_UNSUPPORTED for a head of another bundle, or from a file of
-        version 1."""
+        """Uses `head` as prior for later fits, so that its photos are not needed again. head: of the same person,
+        fitted with the same bundle, such as a head from a file; another call replaces it. Its cameras come first in the
+        fitted head, and a known size stays. Raises MaquetteError, with the status MAQ_ERROR_UNSUPPORTED for a head of
+        another bundle, or from a file of version 1."""
         native().call("maq_head_builder_add_head", self.handle, head.handle)
 
     def clear(self) -> None:
-        """Forgets the photos, and the head that they would be added to, for a head of another person."""
+        """Forgets the photos and the prior head, so that another person's head can be fitted."""
         native().call("maq_head_builder_clear", self.handle)
 
     def fit(
         self,
         seconds: float = 3.0,
-        progress: Callable[[float], bool | None] | None = None,
+        progress: Callable[[float, str], bool | None] | None = None,
         preview: Callable[[Head], None] | None = None,
         preview_interval_s: float = 1.0,
     ) -> Head:
-        """Fits one head to the photos so far: cameras and a first shape in milliseconds, which is the head where
-        `seconds` is 0, then shape and colours to the pixels for up to `seconds`, or until that gains no more. More
-        photos may be added afterwards and all be fitted again.
+        """Fits one head to the photos so far. The first stage finds cameras and a shape in milliseconds; with `seconds`
+        0 that is the result. The second stage fits shape and colours to the pixels, for up to `seconds` or until it
+        converges. More photos may be added afterwards and all be fitted again.
 
-        progress: called with the fraction done; returns False to cancel. preview: called with the head as far as it is
-        fitted, at first with what the network saw, then every preview_interval_s seconds; the fit waits. Neither may
-        call the builder. Raises MaquetteError, with the status MAQ_CANCELLED where it was cancelled, and what the
-        callbacks raise; Ctrl-C ends it.
+        progress: called with the fraction done and the stage, a sentence; returns False to cancel. preview: called with
+        the head as far as it is fitted, first with the network's head, then every preview_interval_s seconds; the fit
+        waits. Neither may call the builder, except `cancel`. Raises MaquetteError, with the status MAQ_CANCELLED if it
+        was cancelled, and the errors of the callbacks; Ctrl-C ends it.
         """
-        n, handle = native(), self.handle
-        callback = ProgressCallback(progress, "maq_head_progress_callback")
-        arguments = ("maq_head", handle, float(seconds), callback.pointer, n.ffi.NULL)
-        if preview is None:
-            return Head(callback.run(lambda: n.create(*arguments, function="maq_head_builder_fit")))
-
-        def show(_: Any, head: Any) -> None:
-            preview(Head(n.ffi.gc(head, n.lib.maq_head_destroy)))
-
-        shown = n.ffi.callback("maq_head_preview_callback", show, onerror=callback.keep)
-        n.call("maq_head_builder_set_preview", handle, float(preview_interval_s), shown, n.ffi.NULL)
+        n, handle, callback = native(), self.handle, self._callback
+        fit = functools.partial(n.create, "maq_head", handle, float(seconds), function="maq_head_builder_fit")
+        self._progress.current = progress
         try:
-            return Head(callback.run(lambda: n.create(*arguments, function="maq_head_builder_fit")))
+            if preview is None:
+                return Head(callback.run(fit))
+
+            def show(_: Any, head: Any) -> None:
+                preview(Head(n.ffi.gc(head, n.lib.maq_head_destroy)))
+
+            shown = n.ffi.callback("maq_head_preview_callback", show, onerror=callback.keep)
+            n.call("maq_head_builder_set_preview", handle, float(preview_interval_s), shown, n.ffi.NULL)
+            try:
+                return Head(callback.run(fit))
+            finally:
+                n.call("maq_head_builder_set_preview", handle, 0, n.ffi.NULL, n.ffi.NULL)
         finally:
-            n.call("maq_head_builder_set_preview", handle, 0, n.ffi.NULL, n.ffi.NULL)
+            self._progress.current = None
 
     def cancel(self) -> None:
-        """Ends the `add_photo` or `fit` that runs, or else the next, with MAQ_CANCELLED. May be called by another
-        thread."""
+        """Ends the running `add_photo` or `fit`, or else the next one, with MAQ_CANCELLED. Any thread may call it."""
         native().call("maq_head_builder_cancel", self.handle)
 
     @property
     def photos(self) -> list[HeadPhoto]:
-        """What was found of each photo, in the order they were added."""
+        """What was found in each photo, in the order of `add_photo`."""
         count = self.stats["photo_count"]
         found = native().indexed("maq_head_builder_get_photo", self.handle, "maq_head_photo_info", count)
-        return [HeadPhoto(tuple(p.box_px), p.head_fraction, bool(p.is_used), p.focal_px, p.rms_px) for p in found]
+        return [HeadPhoto(tuple(p.box_px), p.head_coverage, bool(p.is_used), p.focal_px, p.rms_px) for p in found]
 
     @property
     def stats(self) -> dict[str, float]:
-        """Times and counts, of the photos so far and of the latest fit: the fields of maq_head_stats."""
-        return native().stats("maq_head_stats", "maq_head_builder_get_stats", self.handle)
-
-
-@dataclass(frozen=True, eq=False)
-class HeadImage:
-    """A picture of a head, H x W pixels. rgb: uint8 [H, W, 3], what the renderer's shading says. alpha: uint8 [H, W],
-    coverage by the head. depth_m: float32 [H, W], along the optical axis. normals: float32 [H, W, 3], outwards, in the
-    camera (x right, y down, z forward), of length 1. template_points_m: float32 [H, W, 3], on the template head.
-    All are 0 where there is no head."""
-
-    rgb: np.ndarray
-    alpha: np.ndarray
-    depth_m: np.ndarray
-    normals: np.ndarray
-    template_points_m: np.ndarray
+        """Times and counts, of the photos so far and of the latest fit: the fields of maq_head_build_stats."""
+        return native().stats("maq_head_build_stats", "maq_head_builder_get_stats", self.handle)
 
 
 class HeadRenderer(NativeObject):
-    """Draws the mesh of a head, which it needs no longer afterwards, from any camera.
+    """Renders the mesh of a head from any camera. It does not need the mesh afterwards.
 
-        renderer = maquette.HeadRenderer(head)
+        renderer = maquette.HeadRenderer(head.mesh())
         rgb = renderer.run(renderer.camera(yaw_rad=0.5)).rgb
 
     shading: what colours show: "colour", "shape" (grey), "normals", "template" (template points) or "depth".
-    background: red, green, blue, 0 to 255, over which pictures are composed; None: they are not. triangle_count,
-    cell_m, topology, bundle: of the mesh, as `Head.mesh` has them. settings: fields of maq_head_renderer_config by
-    their names: threads, light, smooth_edges, near_m, ... Raises MaquetteError.
+    background: red, green, blue, 0 to 255, over which images are composed; None: they are not. settings: fields of
+    maq_head_renderer_config by their names: threads, shading_strength, disable_antialiasing, near_m, ... Raises
+    MaquetteError.
     """
 
     def __init__(
-        self,
-        head: Head,
-        shading: str = "colour",
-        background: Sequence[int] | None = None,
-        triangle_count: int | str = 0,
-        cell_m: float = 0,
-        topology: str = "field",
-        bundle: str | Path | None = None,
-        **settings: Any,
+        self, mesh: HeadMesh, shading: str = "colour", background: Sequence[int] | None = None, **settings: Any
     ) -> None:
         n = native()
         if background is not None:
             settings |= {"use_background": 1, "background": _numbers("background", background, "red, green, blue")}
-        mesh = _mesh_options(triangle_count, cell_m, topology, bundle)
-        config = n.config("maq_head_renderer_config", {"shading": _shading(shading), "mesh": mesh, **settings})
-        super().__init__(n.create("maq_head_renderer", n.context, config, head.handle))
+        config = n.config("maq_head_renderer_config", {"shading": _shading(shading), **settings})
+        super().__init__(n.create("maq_head_renderer", n.context, config, mesh.handle))
 
     def camera(
         self, yaw_rad: float = 0, pitch_rad: float = 0, width_px: int = 640, height_px: int = 480
     ) -> PinholeCamera:
-        """One that sees the whole head, whichever way it is turned. yaw_rad: how far it stands to the person's left of
-        the front; pitch_rad: how far above. Raises MaquetteError."""
+        """A camera that sees the whole head from any side. yaw_rad: angle to the person's left of the front; pitch_rad:
+        angle above. Raises MaquetteError."""
         n = native()
         camera = n.sized("maq_pinhole_camera")
         n.call("maq_head_renderer_get_camera", self.handle, yaw_rad, pitch_rad, width_px, height_px, camera)
         return PinholeCamera.of_struct(camera)
 
     def set_shading(self, shading: str) -> None:
-        """Has later pictures show something else."""
+        """Sets the shading of later images."""
         native().call("maq_head_renderer_set_shading", self.handle, _shading(shading))
 
-    def run(self, camera: PinholeCamera) -> HeadImage:
-        """The head as a camera sees it, one without distortion and outside of the head: `camera`, `Head.camera`, or
-        any other in the head's coordinates. One call at a time. Raises MaquetteError."""
-        n = native()
-        image = n.create("maq_head_image", self.handle, camera.to_struct(), function="maq_head_renderer_run",
-                         release="maq_head_image_release")  # fmt: skip
-        shape = camera.intrinsics.height_px, camera.intrinsics.width_px
-
-        def plane(which: int, channels: tuple[int, ...], kind: type) -> np.ndarray:
-            return n.plane("maq_head_image_get_plane", image, which, (*shape, *channels), kind)
-
-        bgr = plane(n.lib.MAQ_HEAD_PLANE_BGR, (3,), np.uint8)
-        made = HeadImage(
-            np.ascontiguousarray(bgr[..., ::-1]),
-            plane(n.lib.MAQ_HEAD_PLANE_ALPHA, (), np.uint8),
-            plane(n.lib.MAQ_HEAD_PLANE_DEPTH, (), np.float32),
-            plane(n.lib.MAQ_HEAD_PLANE_NORMALS, (3,), np.float32),
-            plane(n.lib.MAQ_HEAD_PLANE_TEMPLATE_POINTS, (3,), np.float32),
-        )
-        n.ffi.release(image)
-        return made
-
-
-def _mesh_options(triangle_count: int | str, cell_m: float, topology: str, bundle: str | Path | None) -> Any:
-    if isinstance(triangle_count, str):
-        if triangle_count != "all":
-            raise ValueError(f'triangle_count is "{triangle_count}"; it is a number or "all"')
-        triangle_count = _ALL_TRIANGLES
-    if topology not in TOPOLOGIES:
-        raise ValueError(f'topology is "{topology}"; it is one of {", ".join(TOPOLOGIES)}')
-    settings = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": TOPOLOGIES.index(topology)}
-    if bundle is not None:
-        settings["bundle_path"] = bundle
-    return native().config("maq_head_mesh_options", settings)
+    def run(self, camera: PinholeCamera) -> Image:
+        """Renders the view of a camera, without distortion and outside of the head: `camera`, `Head.camera`, or another
+        in the head's frame. One call at a time. Raises MaquetteError."""
+        return rendered(native(), self.handle, camera.to_struct(), "maq_head_renderer_run", of_head=True)
 
 
 def _shading(name: str) -> int:
     if name not in SHADINGS:
         raise ValueError(f'shading is "{name}"; it is one of {", ".join(SHADINGS)}')
-    return SHADINGS.index(name) + 1
+    return SHADINGS.index(name)
 
 
 def _numbers(name: str, values: Sequence[float], meaning: str) -> list:
-    """As many as `meaning` names: C would fill up what is missing with 0."""
+    """Checks the count of numbers by `meaning`: C would fill missing numbers with 0."""
     given, count = np.asarray(values).tolist(), meaning.count(",") + 1
     if np.shape(values) != (count,):
         raise ValueError(f"{name} is {given}; it is {count} numbers: {meaning}")

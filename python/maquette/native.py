@@ -175,12 +175,12 @@ def native() -> Native:
 
 
 class ProgressCallback:
-    """A callback of the C API, of the type `signature`, around a Python function of the fraction done, and of the stage
-    where the C API tells one. The function may be None, and may return False to cancel. What it raises cancels, too,
+    """A callback of the C API, of the type `signature`, around a Python function of the fraction done and the stage (if
+    the type has one). The function may be None, and may return False to cancel. What it raises cancels, too,
     and comes out of `run`; so does Ctrl-C, for which Python needs to be asked now and then. `pointer`: for the C API.
     """
 
-    def __init__(self, progress: Callable[..., bool | None] | None, signature: str) -> None:
+    def __init__(self, progress: Callable[..., bool | None] | None, signature: str = "maq_progress_callback") -> None:
         ffi = native().ffi
         self._raised: BaseException | None = None
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from maquette.frames import Intrinsics
+from maquette.images import Image, rendered
 from maquette.native import NativeObject, ProgressCallback, native
-
-_PROGRESS = "int32_t(void *, double, const char *)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +57,11 @@ class View:
 
 class Capture(NativeObject):
     """A folder with posed photos and a point cloud: COLMAP, or transforms.json as nerfstudio and Instant-NGP write it
-    (docs/formats.md). drops: what cannot be used, and why. Raises MaquetteError."""
+    (docs/reference/formats.md). drops: unusable parts, with reasons. Raises MaquetteError."""
 
     def __init__(self, folder: str | Path) -> None:
         n = native()
-        opened, release = "maq_capture_open", "maq_capture_close"
-        super().__init__(n.create("maq_capture", n.context, str(folder).encode(), function=opened, release=release))
+        super().__init__(n.create("maq_capture", n.context, str(folder).encode(), function="maq_capture_open"))
         info = n.sized("maq_capture_info")
         n.call("maq_capture_get_info", self.handle, info)
         self.up = np.array(list(info.up))
@@ -76,29 +74,29 @@ class Capture(NativeObject):
 
 
 class Scene(NativeObject):
-    """Points with descriptors, ready to be rendered: `Scene.build(folder)` or `Scene.open("place.maqs")`."""
+    """Points with descriptors, ready to be rendered: `Scene.build(folder)` or `Scene.open("room.maqs")`."""
 
     @staticmethod
     def build(
         capture: Capture | str | Path, progress: Callable[[float, str], bool | None] | None = None, **settings: Any
     ) -> Scene:
-        """progress: called with the fraction done and what is being done; returns False to cancel. settings: fields of
-        maq_scene_build_config by their names: long_side_px, max_views, max_points, ... Raises MaquetteError, and what
-        `progress` raises."""
+        """Builds a scene.
+
+        progress: called with the fraction done and the stage, a sentence; returns False to cancel. settings: fields of
+        maq_scene_build_config by their names: long_side_px, max_views, max_points, threads, bundle_path, ... Raises
+        MaquetteError, and the errors of `progress`."""
         n = native()
         capture = capture if isinstance(capture, Capture) else Capture(capture)
-        callback = ProgressCallback(progress, _PROGRESS)
+        callback = ProgressCallback(progress)
         config = n.config("maq_scene_build_config", {**settings, "progress_callback": callback.pointer})
-        build = ("maq_scene", n.context, config, capture.handle, n.ffi.NULL)
-        return Scene(callback.run(lambda: n.create(*build, function="maq_scene_build", release="maq_scene_close")))
+        build = ("maq_scene", n.context, config, capture.handle)
+        return Scene(callback.run(lambda: n.create(*build, function="maq_scene_build")))
 
     @staticmethod
     def open(path: str | Path) -> Scene:
         """Raises MaquetteError."""
         n = native()
-        return Scene(
-            n.create("maq_scene", n.context, str(path).encode(), function="maq_scene_open", release="maq_scene_close")
-        )
+        return Scene(n.create("maq_scene", n.context, str(path).encode(), function="maq_scene_open"))
 
     def save(self, path: str | Path) -> None:
         """Writes a scene file (.maqs), atomically. Raises MaquetteError."""
@@ -112,6 +110,12 @@ class Scene(NativeObject):
         info = native().sized("maq_scene_info")
         native().call("maq_scene_get_info", self.handle, info)
         return info
+
+    @property
+    def build_stats(self) -> dict[str, float]:
+        """Counts and times of the build: the fields of maq_scene_build_stats. Raises MaquetteError for an opened
+        scene."""
+        return native().stats("maq_scene_build_stats", "maq_scene_get_build_stats", self.handle)
 
     @property
     def point_count(self) -> int:
@@ -129,17 +133,6 @@ class Scene(NativeObject):
         return np.array(list(self._info().up))
 
 
-@dataclass(frozen=True, eq=False)
-class SceneImage:
-    """rgb: uint8 [H, W, 3]. alpha: uint8 [H, W], coverage by points. depth: float32 [H, W] in units of the scene, 0
-    where no point is near. stats: the fields of maq_scene_image_stats."""
-
-    rgb: np.ndarray
-    alpha: np.ndarray
-    depth: np.ndarray
-    stats: dict[str, float] = field(default_factory=dict)
-
-
 class SceneRenderer(NativeObject):
     """settings: fields of maq_scene_renderer_config by their names. Raises MaquetteError."""
 
@@ -148,16 +141,6 @@ class SceneRenderer(NativeObject):
         config = n.config("maq_scene_renderer_config", settings)
         super().__init__(n.create("maq_scene_renderer", n.context, config, scene.handle))
 
-    def run(self, camera: PinholeCamera) -> SceneImage:
-        """The view of a camera. One call at a time. Raises MaquetteError."""
-        n = native()
-        image = n.create("maq_scene_image", self.handle, camera.to_struct(), function="maq_scene_renderer_run",
-                         release="maq_scene_image_release")  # fmt: skip
-        shape = camera.intrinsics.height_px, camera.intrinsics.width_px
-        get = "maq_scene_image_get_plane"
-        bgr = n.plane(get, image, n.lib.MAQ_SCENE_PLANE_BGR, (*shape, 3), np.uint8)
-        alpha = n.plane(get, image, n.lib.MAQ_SCENE_PLANE_ALPHA, shape, np.uint8)
-        depth = n.plane(get, image, n.lib.MAQ_SCENE_PLANE_DEPTH, shape, np.float32)
-        stats = n.stats("maq_scene_image_stats", "maq_scene_image_get_stats", image)
-        n.ffi.release(image)
-        return SceneImage(np.ascontiguousarray(bgr[..., ::-1]), alpha, depth, stats)
+    def run(self, camera: PinholeCamera) -> Image:
+        """Renders the view of a camera. One call at a time. Raises MaquetteError."""
+        return rendered(native(), self.handle, camera.to_struct(), "maq_scene_renderer_run", of_head=False)

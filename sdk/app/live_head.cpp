@@ -15,7 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kPreviewInterval_s = 0.4, kPreviewCell_m = 0.004;
 constexpr int kMaxSide_px = 4096;
-constexpr uint32_t kTexture_px = 1024;  // saved heads and meshes hold the photo's pixels, then
+constexpr uint32_t kTexture_px = 1024;  // saved heads and meshes then hold the photo's pixels
 constexpr std::array<uint8_t, 3> kBackground = {18, 18, 20};
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -33,7 +33,7 @@ double pupil_distance_m(const Head& head) {
                     left.point_m[2] - right.point_m[2]);
 }
 
-// The camera with a picture that fits into that size.
+// The camera with an image that fits into that size.
 maq_pinhole_camera fitted_into(maq_pinhole_camera camera, int width_px, int height_px) {
   maq_intrinsics& lens = camera.intrinsics;
   const double scale = std::min(double(width_px) / lens.width_px, double(height_px) / lens.height_px);
@@ -44,11 +44,11 @@ maq_pinhole_camera fitted_into(maq_pinhole_camera camera, int width_px, int heig
   return camera;
 }
 
-// Over `behind`, which has its size, or a plain background.
-void compose(const HeadImage& image, const RgbaImage& behind, RgbaImage& to) {
+// Composes the image over `behind`, which has its size, or over a plain background.
+void compose(const Image& image, const RgbaImage& behind, RgbaImage& to) {
   size_t bgr_stride = 0, alpha_stride = 0;
-  const auto* const bgr = static_cast<const uint8_t*>(image.plane(MAQ_HEAD_PLANE_BGR, &bgr_stride));
-  const auto* const alpha = static_cast<const uint8_t*>(image.plane(MAQ_HEAD_PLANE_ALPHA, &alpha_stride));
+  const auto* const bgr = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_BGR, &bgr_stride));
+  const auto* const alpha = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_ALPHA, &alpha_stride));
   for (int y = 0; y < to.height_px; ++y) {
     for (int x = 0; x < to.width_px; ++x) {
       const size_t at = 4 * (size_t(y) * size_t(to.width_px) + size_t(x));
@@ -86,10 +86,10 @@ LiveHead::~LiveHead() {
 void LiveHead::fit(LiveHeadPhoto photo, double seconds, bool adds_photo) {
   const std::lock_guard<std::mutex> lock(mutex_);
   auto state = std::make_shared<LiveHeadState>(*state_);
-  state->phase = LiveHeadState::kFitting, state->progress = 0, state->text = "Looking at the photo.";
+  state->phase = LiveHeadState::kFitting, state->progress = 0, state->text = "Encoding the photo.";
   state_ = std::move(state);
   request_ = Request{std::move(photo), seconds, adds_photo};
-  is_cancelled_ = true;  // what runs, until the thread takes the request
+  is_cancelled_ = true;  // the running fit, until the thread takes the request
   wake_fits_.notify_one();
 }
 
@@ -139,13 +139,16 @@ void LiveHead::run_fits() {
 void LiveHead::fit_photo(const Request& request) {
   const auto start = Clock::now();
   if (!builder_) {
-    maq_head_config config = default_head_config();
-    config.bundle_path = bundle_path_.c_str(), config.threads = threads_;
-    config.allow_spinning = 0;  // a thread that stays awake takes a core from the window
+    maq_head_builder_config config = default_head_builder_config();
+    config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads_;
+    config.model.spinning = MAQ_SPINNING_OFF;  // a thread that stays awake takes a core from the window
+    config.texture = MAQ_HEAD_TEXTURE_ON;
     config.texture_px = kTexture_px;
+    config.progress_callback = tell_progress;
+    config.progress_user_data = this;
     builder_.emplace(context_, config);
   }
-  photo_ = std::make_shared<const RgbaImage>(request.photo.picture);
+  photo_ = std::make_shared<const RgbaImage>(request.photo.image);
   update([&](LiveHeadState& state) { state.photo = photo_; });
   maq_head_photo known = default_head_photo();
   if (request.photo.box_px) std::copy(request.photo.box_px->begin(), request.photo.box_px->end(), known.box_px);
@@ -153,25 +156,22 @@ void LiveHead::fit_photo(const Request& request) {
   builder_->add_photo(photo_->as_frame(context_), known);
   const uint32_t index = builder_->stats().photo_count - 1;
 
-  std::shared_ptr<Head> latest;  // of the previews
+  std::shared_ptr<const Head> latest;  // of the previews
   builder_->set_preview(kPreviewInterval_s, [&](Head preview) {
     try {
       if (is_cancelled_) return;
-      latest = std::make_shared<Head>(std::move(preview));
-      maq_head_mesh_options coarse = default_head_mesh_options();
+      latest = std::make_shared<const Head>(std::move(preview));
+      maq_head_mesh_config coarse = default_head_mesh_config();
       coarse.cell_m = kPreviewCell_m;
-      show(*latest, coarse, !request.adds_photo);
+      show(*latest, HeadMesh(*latest, coarse), !request.adds_photo);
     } catch (const std::exception&) {  // the head itself may still be fine
     }
   });
   update([](LiveHeadState& state) { state.text = "Fitting the head to the photo."; });
   std::string text;
-  std::shared_ptr<Head> fitted;
+  std::shared_ptr<const Head> fitted;
   try {
-    fitted = std::make_shared<Head>(builder_->fit(request.seconds, [&](double done) {
-      update([&](LiveHeadState& state) { state.progress = done; });
-      return !is_cancelled_;
-    }));
+    fitted = std::make_shared<const Head>(builder_->fit(request.seconds));
   } catch (const Error& error) {
     builder_->set_preview(0, nullptr);
     if (error.status() != MAQ_CANCELLED || latest == nullptr) throw;
@@ -180,28 +180,34 @@ void LiveHead::fit_photo(const Request& request) {
   }
   builder_->set_preview(0, nullptr);
   const bool is_used = builder_->photo(index).is_used != 0;
-  if (!is_used && text.empty()) text = "The photo was left out: it shows no head, or another than the photos before.";
+  if (!is_used && text.empty()) text = "The photo was rejected: it shows no head, or a different person.";
   update([](LiveHeadState& state) { state.text = "Making the mesh."; });
-  show(*fitted, default_head_mesh_options(), is_used);
-  const uint32_t triangles = fitted->mesh().triangle_count;
-  const maq_head_stats stats = builder_->stats();
+  const auto ready = std::make_shared<const FittedHead>(FittedHead{fitted, HeadMesh(*fitted)});
+  show(*fitted, ready->mesh, is_used);
+  const maq_head_build_stats stats = builder_->stats();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    head_ = fitted;
+    fitted_ = ready;
   }
   update([&](LiveHeadState& state) {
     state.phase = LiveHeadState::kReady, state.progress = 1, state.text = text;
     state.photo_count = stats.photo_count, state.used_photo_count = stats.used_photo_count;
-    state.triangle_count = triangles, state.pupil_distance_m = pupil_distance_m(*fitted);
+    state.triangle_count = ready->mesh.data().triangle_count, state.pupil_distance_m = pupil_distance_m(*fitted);
     state.seconds = seconds_since(start);
   });
 }
 
-// Of the latest photo the camera is the last.
-void LiveHead::show(Head& head, const maq_head_mesh_options& mesh, bool has_photo_camera) {
+int32_t LiveHead::tell_progress(void* live_head, double done, const char*) {
+  auto* const self = static_cast<LiveHead*>(live_head);
+  self->update([&](LiveHeadState& state) { state.progress = done; });
+  return self->is_cancelled_ ? 0 : 1;
+}
+
+// The last camera belongs to the latest photo.
+void LiveHead::show(const Head& head, const HeadMesh& mesh, bool has_photo_camera) {
   maq_head_renderer_config config = default_head_renderer_config();
-  config.threads = threads_, config.mesh = &mesh;
-  Shown made{HeadRenderer(context_, config, head), {}, photo_};
+  config.threads = threads_;
+  Shown made{HeadRenderer(context_, config, mesh), {}, photo_};
   const uint32_t cameras = head.info().photo_count;
   if (has_photo_camera && cameras > 0) made.photo_camera = head.camera(cameras - 1);
   auto shown = std::make_shared<Shown>(std::move(made));

@@ -1,8 +1,8 @@
-// A head fitted to pictures on a thread of its own and rendered on another, for programs with a window: what is there
-// of it can be turned while it still forms. No call waits but the destructor's.
+// A head that one thread fits to photos and another renders, for programs with a window. The head can be turned while
+// it is fitted. Only the destructor waits.
 //
 //   maquette::LiveHead head(context, "models/heads-int8");
-//   head.fit({picture, box_px}, 3.0, false);
+//   head.fit({image, box_px}, 3.0, false);
 //   for (;;) { head.render(view); if (head.images().take()) draw(head.images().front().rendering); }
 #pragma once
 
@@ -24,17 +24,16 @@
 namespace maquette {
 
 struct LiveHeadPhoto {
-  RgbaImage picture;
-  std::optional<std::array<float, 4>> box_px;  // of the head, as in maq_head_photo; nothing: it is looked for
+  RgbaImage image;
+  std::optional<std::array<float, 4>> box_px;  // of the head, as in maq_head_photo; nothing: it is detected
 };
 
 struct LiveHeadView {
-  int width_px = 640, height_px = 480;  // at most; over the photo the picture has the photo's shape
+  int width_px = 640, height_px = 480;  // at most; over the photo the image has the photo's shape
   double yaw_rad = 0, pitch_rad = 0;    // of the camera: to the person's left, up
   double zoom = 1;                      // above 1 the head is larger
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
-  bool is_over_photo =
-      false;  // as the photo's camera sees it, drawn on the photo; where that is not known from its yaw
+  bool is_over_photo = false;  // drawn on the photo, by the photo's camera; if that is unknown, by yaw and pitch
 };
 
 struct LiveHeadImage {
@@ -46,13 +45,18 @@ struct LiveHeadImage {
 struct LiveHeadState {
   enum Phase { kNone, kFitting, kReady, kFailed } phase = kNone;
   double progress = 0;                             // 0 to 1, while it is fitted
-  std::string text;                                // what is being done, or why it failed, in sentences; or nothing
-  bool has_head = false;                           // there is something to be rendered
-  std::shared_ptr<const RgbaImage> photo;          // the latest that was given
+  std::string text;                                // the stage, or why it failed, in sentences; may be empty
+  bool has_head = false;                           // there is a head to render
+  std::shared_ptr<const RgbaImage> photo;          // the latest photo
   uint32_t photo_count = 0, used_photo_count = 0;  // from here on: of the head that is ready
   uint32_t triangle_count = 0;
   double pupil_distance_m = 0;  // 0: not known
   double seconds = 0;           // from the photo to the mesh
+};
+
+struct FittedHead {
+  std::shared_ptr<const Head> head;
+  HeadMesh mesh;
 };
 
 class LiveHead {  // all calls by the thread that takes the images
@@ -63,22 +67,21 @@ class LiveHead {  // all calls by the thread that takes the images
            std::function<void()> on_change = nullptr);
   ~LiveHead();  // waits for the step that runs
 
-  // Fits a head to a photo, for `seconds`; `adds_photo`: together with those of the head so far. What is being fitted
-  // is given up.
+  // Fits a head to a photo, for `seconds`; `adds_photo`: together with the earlier photos. A running fit is cancelled.
   void fit(LiveHeadPhoto photo, double seconds, bool adds_photo);
-  // Ends the fit; what there is of the head stays.
+  // Ends the fit; the latest preview of the head stays.
   void cancel() { is_cancelled_ = true; }
-  // Renders an image once there is something of a head, and again when there is more of it; the latest call wins.
+  // Renders an image once there is a preview of a head, and again for each later preview; the latest call wins.
   void render(const LiveHeadView& view);
 
   std::shared_ptr<const LiveHeadState> state() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return state_;
   }
-  // The head that is ready, or null; for one thread at a time.
-  std::shared_ptr<Head> head() const {
+  // The fitted head, or null.
+  std::shared_ptr<const FittedHead> fitted() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return head_;
+    return fitted_;
   }
   TripleBuffer<LiveHeadImage>& images() { return images_; }
   const TripleBuffer<LiveHeadImage>& images() const { return images_; }
@@ -89,7 +92,7 @@ class LiveHead {  // all calls by the thread that takes the images
     double seconds = 0;
     bool adds_photo = false;
   };
-  // What is rendered; of the thread that renders alone, once it is set.
+  // For the thread that renders, once it is set.
   struct Shown {
     HeadRenderer renderer;
     std::optional<maq_pinhole_camera> photo_camera;
@@ -100,20 +103,21 @@ class LiveHead {  // all calls by the thread that takes the images
   void fit_photo(const Request& request);
   void run_renderings();
   void render_shown(Shown& shown, const LiveHeadView& view, LiveHeadImage& image);
-  void show(Head& head, const maq_head_mesh_options& mesh, bool has_photo_camera);
+  static int32_t tell_progress(void* live_head, double done, const char* stage);
+  void show(const Head& head, const HeadMesh& mesh, bool has_photo_camera);
   void update(const std::function<void(LiveHeadState&)>& change) noexcept;
 
   const Context& context_;
   const std::string bundle_path_;
   const int threads_;
   const std::function<void()> on_change_;
-  mutable std::mutex mutex_;  // of what the threads share
+  mutable std::mutex mutex_;  // guards the shared members
   std::condition_variable wake_fits_, wake_renderings_;
   std::optional<Request> request_;
   std::atomic<bool> is_cancelled_{false};  // the fit that runs
   bool ends_ = false;
   std::shared_ptr<const LiveHeadState> state_ = std::make_shared<LiveHeadState>();
-  std::shared_ptr<Head> head_;
+  std::shared_ptr<const FittedHead> fitted_;
   std::shared_ptr<Shown> shown_;
   std::optional<LiveHeadView> view_;
   bool needs_image_ = false;

@@ -130,10 +130,11 @@ void LiveScene::load(const Request& request) {
   }
   if (builds) {
     maq_scene_build_config config = default_scene_build_config();
-    config.bundle_path = bundle_path_.c_str(), config.threads = request.threads, config.progress_user_data = this;
-    config.progress_callback = [](void* self, double done, const char* what) -> int32_t {
+    config.model.bundle_path = bundle_path_.c_str(), config.model.threads = request.threads;
+    config.progress_user_data = this;
+    config.progress_callback = [](void* self, double done, const char* stage) -> int32_t {
       return static_cast<LiveScene*>(self)->update(
-          [&](LiveSceneState& state) { state.progress = done, state.text = what; });
+          [&](LiveSceneState& state) { state.progress = done, state.text = stage; });
     };
     scene_.emplace(context_, config, *capture_);
   } else {
@@ -152,7 +153,7 @@ void LiveScene::load(const Request& request) {
 void LiveScene::make_renderer(int threads) {
   threads_ = threads;
   maq_scene_renderer_config config = default_scene_renderer_config();
-  config.bundle_path = bundle_path_.c_str(), config.threads = threads;
+  config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads;
   renderer_ = SceneRenderer(context_, config, *scene_);
 }
 
@@ -160,7 +161,7 @@ void LiveScene::render(const Request& request) {
   if (threads_ != request.threads) make_renderer(request.threads);
   LiveSceneImage& image = images_.back();
   image.camera = within_limits(*request.camera);
-  const SceneImage rendered = renderer_->run(image.camera);
+  const Image rendered = renderer_->run(image.camera);
   maq_frame_desc desc{sizeof desc,
                       MAQ_PIXEL_BGR8,
                       image.camera.intrinsics.width_px,
@@ -170,9 +171,9 @@ void LiveScene::render(const Request& request) {
                       0,
                       MAQ_CLOCK_MEDIA,
                       0};
-  desc.planes[0] = static_cast<const uint8_t*>(rendered.plane(MAQ_SCENE_PLANE_BGR, desc.stride_bytes));
+  desc.planes[0] = static_cast<const uint8_t*>(rendered.plane(MAQ_IMAGE_PLANE_BGR, desc.stride_bytes));
   image.rendering.copy_from(Frame(context_, desc));
-  image.stats = rendered.stats(), image.photo_index = -1, image.psnr_db = NAN;
+  image.stats = rendered.scene_stats(), image.photo_index = -1, image.psnr_db = NAN;
   image.photo.clear(), image.error.clear();
   std::string text = missing_;
   try {

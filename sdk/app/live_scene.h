@@ -1,5 +1,5 @@
-// A scene on a thread of its own, for programs with a window: opens it, builds it of a capture, renders what is asked
-// for. No call waits but the destructor's.
+// A scene on its own thread, for programs with a window: opens it or builds it from a capture, and renders it. Only the
+// destructor waits.
 //
 //   maquette::LiveScene scene(context, "models/scenes-int8");
 //   scene.open("room.maqs");
@@ -28,7 +28,7 @@ struct LiveSceneImage {
   double psnr_db = 0;  // NaN where the photo is empty, infinite where nothing differs
   int photo_index = -1;
   maq_pinhole_camera camera{};  // of the rendering's size
-  maq_scene_image_stats stats{};
+  maq_scene_render_stats stats{};
   uint64_t number = 0;  // counts images from 1
 };
 

@@ -9,19 +9,20 @@ int main(int argc, char** argv) {
   maq_frame* frame = NULL;
   maq_densepose* densepose = NULL;
   maq_densepose_result* people = NULL;
-  maq_head_config config;
+  maq_head_builder_config config;
   maq_head_photo photo;
   maq_head_builder* builder = NULL;
   maq_head* head = NULL;
+  maq_head_mesh* mesh = NULL;
   maq_head_landmark nose;
   int failed;
   if (argc < 3) {
     fprintf(stderr, "usage: head <photo> <mesh.glb> [<bundle of heads>]\n");
     return 2;
   }
-  maq_head_config_init(&config, sizeof config);
+  maq_head_builder_config_init(&config, sizeof config);
   maq_head_photo_init(&photo, sizeof photo);
-  config.bundle_path = argc > 3 ? argv[3] : NULL;
+  config.model.bundle_path = argc > 3 ? argv[3] : NULL;
   failed = maq_context_create(MAQ_HEADER_VERSION, NULL, &context) != MAQ_OK ||
            maq_source_create(context, argv[1], NULL, &source) != MAQ_OK ||
            maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame) != MAQ_OK ||
@@ -32,14 +33,15 @@ int main(int argc, char** argv) {
   }
   failed = failed || maq_head_builder_create(context, &config, &builder) != MAQ_OK ||
            maq_head_builder_add_photo(builder, frame, &photo) != MAQ_OK ||
-           maq_head_builder_fit(builder, 3.0, NULL, NULL, &head) != MAQ_OK ||
-           maq_head_export(head, argv[2], NULL) != MAQ_OK;
+           maq_head_builder_fit(builder, 3.0, &head) != MAQ_OK || maq_head_mesh_create(head, NULL, &mesh) != MAQ_OK ||
+           maq_head_mesh_save(mesh, argv[2]) != MAQ_OK;
   if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   nose.struct_size = sizeof nose;
   if (!failed && maq_head_get_landmark(head, "nose_tip", &nose) == MAQ_OK) {
     printf("%s: the nose ends %.0f mm before the middle of the head\n", argv[2], -1e3 * nose.point_m[1]);
   }
-  maq_head_destroy(head), maq_head_builder_destroy(builder), maq_densepose_result_release(people);
+  maq_head_mesh_destroy(mesh), maq_head_destroy(head), maq_head_builder_destroy(builder),
+      maq_densepose_result_release(people);
   maq_densepose_destroy(densepose), maq_frame_release(frame), maq_source_destroy(source), maq_context_destroy(context);
   return failed;
 }

@@ -2,7 +2,6 @@
 #ifndef MAQUETTE_HEAD_HPP_
 #define MAQUETTE_HEAD_HPP_
 
-#include <exception>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,12 +10,13 @@
 
 #include "maquette/frame.hpp"
 #include "maquette/head.h"
+#include "maquette/image.hpp"
 
 namespace maquette {
 
-inline maq_head_config default_head_config() {
-  maq_head_config config;
-  check(maq_head_config_init(&config, sizeof config));
+inline maq_head_builder_config default_head_builder_config() {
+  maq_head_builder_config config;
+  check(maq_head_builder_config_init(&config, sizeof config));
   return config;
 }
 
@@ -26,10 +26,16 @@ inline maq_head_photo default_head_photo() {
   return photo;
 }
 
-inline maq_head_mesh_options default_head_mesh_options() {
-  maq_head_mesh_options options;
-  check(maq_head_mesh_options_init(&options, sizeof options));
-  return options;
+inline maq_head_mesh_config default_head_mesh_config() {
+  maq_head_mesh_config config;
+  check(maq_head_mesh_config_init(&config, sizeof config));
+  return config;
+}
+
+inline maq_head_renderer_config default_head_renderer_config() {
+  maq_head_renderer_config config;
+  check(maq_head_renderer_config_init(&config, sizeof config));
+  return config;
 }
 
 class Head {
@@ -43,7 +49,7 @@ class Head {
     return Head(opened);
   }
 
-  // A head file in memory, which is copied.
+  // Opens a head file in memory, which is copied.
   static Head open(const Context& context, const void* data, size_t size_bytes) {
     maq_head* opened = nullptr;
     check(maq_head_open_memory(context.get(), data, size_bytes, &opened));
@@ -52,15 +58,15 @@ class Head {
 
   maq_head* get() const { return owner_.get(); }
 
-  // The same head of the size at which the two places are so far apart.
-  Head scaled_by_distance(const std::string& from, const std::string& to, double distance_m) {
+  // Copies the head with the size at which the two landmarks are `distance_m` apart.
+  Head scaled_by_distance(const std::string& from, const std::string& to, double distance_m) const {
     maq_head* scaled = nullptr;
     check(maq_head_scale_by_distance(get(), from.c_str(), to.c_str(), distance_m, &scaled));
     return Head(scaled);
   }
 
-  // The same head of the size at which it lies where the depth of the frame sees it, from the photo at `index`.
-  Head scaled_by_depth(const Frame& frame, uint32_t index = 0) {
+  // Copies the head with the size at which it fits the depth of the frame, in the view of the photo at `index`.
+  Head scaled_by_depth(const Frame& frame, uint32_t index = 0) const {
     maq_head* scaled = nullptr;
     check(maq_head_scale_by_depth(get(), index, frame.get(), &scaled));
     return Head(scaled);
@@ -86,7 +92,7 @@ class Head {
     return landmark;
   }
 
-  // Of the photo at `index`, below info().photo_count.
+  // Returns the camera of the photo at `index`, below info().photo_count.
   maq_pinhole_camera camera(uint32_t index) const {
     maq_pinhole_camera camera{};
     camera.struct_size = sizeof camera;
@@ -94,39 +100,52 @@ class Head {
     return camera;
   }
 
-  // Its arrays are this object's, until a mesh with other options is asked for.
-  maq_head_mesh mesh(const maq_head_mesh_options& options = default_head_mesh_options()) {
-    maq_head_mesh mesh{};
-    mesh.struct_size = sizeof mesh;
-    check(maq_head_get_mesh(get(), &options, &mesh));
-    return mesh;
-  }
-
-  // Of the mesh that was made last.
-  maq_head_morph_target morph_target(uint32_t index) const {
-    maq_head_morph_target target{};
-    target.struct_size = sizeof target;
-    check(maq_head_get_morph_target(get(), index, &target));
-    return target;
-  }
-
   void save(const std::string& path) const { check(maq_head_save(get(), path.c_str())); }
-  void export_mesh(const std::string& path, const maq_head_mesh_options& options = default_head_mesh_options()) {
-    check(maq_head_export(get(), path.c_str(), &options));
-  }
 
  private:
   Owner<maq_head, maq_head_destroy> owner_;
 };
 
+class HeadMesh {
+ public:
+  explicit HeadMesh(const Head& head, const maq_head_mesh_config& config = default_head_mesh_config()) {
+    maq_head_mesh* made = nullptr;
+    check(maq_head_mesh_create(head.get(), &config, &made));
+    owner_.reset(made);
+  }
+
+  maq_head_mesh* get() const { return owner_.get(); }
+
+  // The arrays are this object's.
+  maq_head_mesh_data data() const {
+    maq_head_mesh_data data{};
+    data.struct_size = sizeof data;
+    check(maq_head_mesh_get_data(get(), &data));
+    return data;
+  }
+
+  // The arrays are this object's. `index` is below data().morph_target_count.
+  maq_head_morph_target morph_target(uint32_t index) const {
+    maq_head_morph_target target{};
+    target.struct_size = sizeof target;
+    check(maq_head_mesh_get_morph_target(get(), index, &target));
+    return target;
+  }
+
+  void save(const std::string& path) const { check(maq_head_mesh_save(get(), path.c_str())); }
+
+ private:
+  Owner<maq_head_mesh, maq_head_mesh_destroy> owner_;
+};
+
 class HeadBuilder {
  public:
-  HeadBuilder(const Context& context, const maq_head_config& config) { create(context, config); }
-  // The bundle installed with the library.
-  explicit HeadBuilder(const Context& context) { create(context, default_head_config()); }
+  HeadBuilder(const Context& context, const maq_head_builder_config& config) { create(context, config); }
+  // Uses the bundle installed with the library.
+  explicit HeadBuilder(const Context& context) { create(context, default_head_builder_config()); }
   HeadBuilder(const Context& context, const std::string& bundle_path) {
-    maq_head_config config = default_head_config();
-    config.bundle_path = bundle_path.c_str();
+    maq_head_builder_config config = default_head_builder_config();
+    config.model.bundle_path = bundle_path.c_str();
     create(context, config);
   }
 
@@ -135,38 +154,18 @@ class HeadBuilder {
   void add_photo(const Frame& frame, const maq_head_photo& photo = default_head_photo()) {
     check(maq_head_builder_add_photo(get(), frame.get(), &photo));
   }
-  // Adds the photos to those that `head` was fitted to.
+  // Uses `head` as prior for later fits.
   void add_head(const Head& head) { check(maq_head_builder_add_head(get(), head.get())); }
   void clear() { check(maq_head_builder_clear(get())); }
 
-  // `progress` gets the fraction that is done and returns whether to go on; what it throws ends the fit and is thrown.
-  Head fit(double seconds, const std::function<bool(double)>& progress = {}) {
-    struct Call {
-      const std::function<bool(double)>& progress;
-      std::exception_ptr failure;
-    } call{progress, {}};
-    const auto pass_on = [](void* user_data, double done) -> int32_t {
-      auto* const to = static_cast<Call*>(user_data);
-      try {
-        return to->progress(done) ? 1 : 0;
-      } catch (...) {
-        to->failure = std::current_exception();
-        return 0;
-      }
-    };
+  Head fit(double seconds) {
     maq_head* fitted = nullptr;
-    const maq_status status = maq_head_builder_fit(
-        get(), seconds, progress ? static_cast<maq_head_progress_callback>(pass_on) : nullptr, &call, &fitted);
-    if (call.failure) {
-      maq_head_destroy(fitted);
-      std::rethrow_exception(call.failure);
-    }
-    check(status);
+    check(maq_head_builder_fit(get(), seconds, &fitted));
     return Head(fitted);
   }
 
-  // `preview` gets the head so far during fits, which wait: first what the network saw, then every `interval_s`
-  // seconds. It may not throw. An empty one: no longer.
+  // `preview` gets the head so far during fits, which wait: first the network's head, then every `interval_s` seconds.
+  // It must not throw. An empty function ends previews.
   void set_preview(double interval_s, std::function<void(Head)> preview) {
     auto kept = preview ? std::make_unique<std::function<void(Head)>>(std::move(preview)) : nullptr;
     const auto pass_on = [](void* user_data, maq_head* head) {
@@ -177,11 +176,11 @@ class HeadBuilder {
     preview_ = std::move(kept);
   }
 
-  // From any thread: what runs, or else the next, throws Error with MAQ_CANCELLED.
+  // From any thread: the running call, or else the next one, throws Error with MAQ_CANCELLED.
   void cancel() { check(maq_head_builder_cancel(get())); }
 
-  maq_head_stats stats() const {
-    maq_head_stats stats{};
+  maq_head_build_stats stats() const {
+    maq_head_build_stats stats{};
     stats.struct_size = sizeof stats;
     check(maq_head_builder_get_stats(get(), &stats));
     return stats;
@@ -195,7 +194,7 @@ class HeadBuilder {
   }
 
  private:
-  void create(const Context& context, const maq_head_config& config) {
+  void create(const Context& context, const maq_head_builder_config& config) {
     maq_head_builder* made = nullptr;
     check(maq_head_builder_create(context.get(), &config, &made));
     owner_.reset(made);
@@ -205,39 +204,11 @@ class HeadBuilder {
   Owner<maq_head_builder, maq_head_builder_destroy> owner_;
 };
 
-inline maq_head_renderer_config default_head_renderer_config() {
-  maq_head_renderer_config config;
-  check(maq_head_renderer_config_init(&config, sizeof config));
-  return config;
-}
-
-class HeadImage {
- public:
-  // Takes over an image of the C API.
-  explicit HeadImage(maq_head_image* image) : owner_(image) {}
-
-  maq_head_image* get() const { return owner_.get(); }
-
-  // Rows of *stride_bytes.
-  const void* plane(maq_head_plane plane, size_t* stride_bytes) const {
-    const void* pixels = nullptr;
-    check(maq_head_image_get_plane(get(), plane, &pixels, stride_bytes));
-    return pixels;
-  }
-
-  void save(const std::string& path, bool with_alpha = false) const {
-    check(maq_head_image_save(get(), path.c_str(), with_alpha ? 1 : 0));
-  }
-
- private:
-  Owner<maq_head_image, maq_head_image_release> owner_;
-};
-
 class HeadRenderer {
  public:
-  HeadRenderer(const Context& context, const maq_head_renderer_config& config, Head& head) {
+  HeadRenderer(const Context& context, const maq_head_renderer_config& config, const HeadMesh& mesh) {
     maq_head_renderer* made = nullptr;
-    check(maq_head_renderer_create(context.get(), &config, head.get(), &made));
+    check(maq_head_renderer_create(context.get(), &config, mesh.get(), &made));
     owner_.reset(made);
   }
 
@@ -252,10 +223,10 @@ class HeadRenderer {
 
   void set_shading(maq_head_shading shading) { check(maq_head_renderer_set_shading(get(), shading)); }
 
-  HeadImage run(const maq_pinhole_camera& camera) {
-    maq_head_image* image = nullptr;
+  Image run(const maq_pinhole_camera& camera) {
+    maq_image* image = nullptr;
     check(maq_head_renderer_run(get(), &camera, &image));
-    return HeadImage(image);
+    return Image(image);
   }
 
  private:

@@ -14,9 +14,8 @@
  * - Each verb that returns an object is paired with one that gives the object back. Call it once for each object, in
  *   any order; NULL is fine:
  *
- *     _create                                 _destroy   contexts, sources, lists, models, builders, renderers, writers
- *     _open, _open_memory, _build, _finish    _close     captures and scenes
- *     _open, _open_memory, _fit, _scale_…     _destroy   heads
+ *     _create, _open, _open_memory, _build,   _destroy   contexts, sources, lists, models, builders, captures, scenes,
+ *     _fit, _scale_…, _finish                            heads, meshes, renderers, writers
  *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
  *     _wrap, _decode, _resize, _convert_yuv,
  *     _predict
@@ -45,7 +44,7 @@
  *   be called from any thread, but not for the same handle from two threads at once.
  * - Misuse is MAQ_ERROR_INVALID_ARGUMENT where the library can see it: an object of another type, one that was given
  *   back before, two calls at once on an object whose functions run one at a time, also from a callback of the first.
- *   A `_destroy`, `_close` or `_release` for which that holds changes nothing, and maq_last_error(NULL) says why. The
+ *   A `_destroy` or `_release` for which that holds changes nothing, and maq_last_error(NULL) says why. The
  *   library cannot see, and the behaviour is undefined for:
  *
  *     - a pointer that is not of this library; a shorter array or buffer than was said;
@@ -64,6 +63,7 @@
 #include "maquette/clip.h"
 #include "maquette/context.h"
 #include "maquette/frame.h"
+#include "maquette/image.h"
 #include "maquette/pipeline.h"
 #include "maquette/recorder.h"
 #include "maquette/source.h"

@@ -15,6 +15,7 @@
 
 #include "maquette/context.hpp"
 #include "maquette/frame.hpp"
+#include "maquette/image.hpp"
 #include "maquette/maquette.h"
 #include "maquette/pipeline.hpp"
 #include "maquette/source.hpp"

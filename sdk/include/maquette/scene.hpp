@@ -1,4 +1,4 @@
-// Captures, scenes and their pictures, for C++17; a part of maquette.hpp.
+// Captures, scenes and their images, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_SCENE_HPP_
 #define MAQUETTE_SCENE_HPP_
 
@@ -7,6 +7,7 @@
 
 #include "maquette/capture.h"
 #include "maquette/frame.hpp"
+#include "maquette/image.hpp"
 #include "maquette/scene.h"
 
 namespace maquette {
@@ -40,7 +41,7 @@ class Capture {
     return info;
   }
 
-  // Its texts are the capture's.
+  // The texts are the capture's.
   maq_capture_view view(uint32_t index) const {
     maq_capture_view view{};
     view.struct_size = sizeof view;
@@ -48,7 +49,7 @@ class Capture {
     return view;
   }
 
-  // Its text is the capture's.
+  // The text is the capture's.
   maq_capture_drop drop(uint32_t index) const {
     maq_capture_drop drop{};
     drop.struct_size = sizeof drop;
@@ -56,7 +57,7 @@ class Capture {
     return drop;
   }
 
-  // With its camera.
+  // Returns the depth image and its camera.
   std::pair<Frame, maq_pinhole_camera> load_depth(uint32_t index) const {
     maq_frame* frame = nullptr;
     maq_pinhole_camera camera{};
@@ -65,7 +66,7 @@ class Capture {
     return {Frame(frame), camera};
   }
 
-  // BGR, undistorted.
+  // Returns the undistorted photo, MAQ_PIXEL_BGR8.
   Frame load_view(uint32_t index) const {
     maq_frame* frame = nullptr;
     check(maq_capture_load_view(get(), index, &frame));
@@ -73,7 +74,7 @@ class Capture {
   }
 
  private:
-  Owner<maq_capture, maq_capture_close> owner_;
+  Owner<maq_capture, maq_capture_destroy> owner_;
 };
 
 class Scene {
@@ -87,19 +88,16 @@ class Scene {
     owner_.reset(opened);
   }
 
-  // A scene file in memory, which is copied.
+  // Opens a scene file in memory, which is copied.
   Scene(const Context& context, const void* data, size_t size_bytes) {
     maq_scene* opened = nullptr;
     check(maq_scene_open_memory(context.get(), data, size_bytes, &opened));
     owner_.reset(opened);
   }
 
-  // `stats` may be null.
-  Scene(const Context& context, const maq_scene_build_config& config, const Capture& capture,
-        maq_scene_build_stats* stats = nullptr) {
-    if (stats != nullptr) stats->struct_size = sizeof *stats;
+  Scene(const Context& context, const maq_scene_build_config& config, const Capture& capture) {
     maq_scene* built = nullptr;
-    check(maq_scene_build(context.get(), &config, capture.get(), stats, &built));
+    check(maq_scene_build(context.get(), &config, capture.get(), &built));
     owner_.reset(built);
   }
 
@@ -115,8 +113,16 @@ class Scene {
     return info;
   }
 
+  // For scenes that were built, not opened.
+  maq_scene_build_stats build_stats() const {
+    maq_scene_build_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_scene_get_build_stats(get(), &stats));
+    return stats;
+  }
+
  private:
-  Owner<maq_scene, maq_scene_close> owner_;
+  Owner<maq_scene, maq_scene_destroy> owner_;
 };
 
 class SceneBuilder {
@@ -129,7 +135,7 @@ class SceneBuilder {
 
   maq_scene_builder* get() const { return owner_.get(); }
 
-  // Returns how many points the photo saw.
+  // Returns the number of points that the photo saw.
   uint64_t add_view(const Frame& photo, const maq_pinhole_camera& camera) {
     uint64_t seen_point_count = 0;
     check(maq_scene_builder_add_view(get(), photo.get(), &camera, &seen_point_count));
@@ -155,35 +161,6 @@ class SceneBuilder {
   Owner<maq_scene_builder, maq_scene_builder_destroy> owner_;
 };
 
-class SceneImage {
- public:
-  // Takes over an image of the C API.
-  explicit SceneImage(maq_scene_image* image) : owner_(image) {}
-
-  maq_scene_image* get() const { return owner_.get(); }
-
-  // Rows of *stride_bytes.
-  const void* plane(maq_scene_plane plane, size_t* stride_bytes) const {
-    const void* pixels = nullptr;
-    check(maq_scene_image_get_plane(get(), plane, &pixels, stride_bytes));
-    return pixels;
-  }
-
-  maq_scene_image_stats stats() const {
-    maq_scene_image_stats stats{};
-    stats.struct_size = sizeof stats;
-    check(maq_scene_image_get_stats(get(), &stats));
-    return stats;
-  }
-
-  void save(const std::string& path, bool with_alpha = false) const {
-    check(maq_scene_image_save(get(), path.c_str(), with_alpha ? 1 : 0));
-  }
-
- private:
-  Owner<maq_scene_image, maq_scene_image_release> owner_;
-};
-
 class SceneRenderer {
  public:
   SceneRenderer(const Context& context, const maq_scene_renderer_config& config, const Scene& scene) {
@@ -194,10 +171,10 @@ class SceneRenderer {
 
   maq_scene_renderer* get() const { return owner_.get(); }
 
-  SceneImage run(const maq_pinhole_camera& camera) {
-    maq_scene_image* image = nullptr;
+  Image run(const maq_pinhole_camera& camera) {
+    maq_image* image = nullptr;
     check(maq_scene_renderer_run(get(), &camera, &image));
-    return SceneImage(image);
+    return Image(image);
   }
 
  private:

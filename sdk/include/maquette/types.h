@@ -94,6 +94,12 @@ typedef struct maq_model_options {
   const maq_memory_file* bundle_files; /* the bundle's files in memory; default NULL */
 } maq_model_options;
 
+/* Receives the progress of a long call, on the thread of that call. `done` is the finished fraction, 0 to 1. `stage` is
+ * a sentence that says what runs now; it is valid during the callback. `user_data` is the config's progress_user_data.
+ * Return 0 to cancel the call, which then returns MAQ_CANCELLED; return anything else to go on. The callback must not
+ * use the object that calls it, except for its `_cancel`, and must not throw. */
+typedef int32_t (*maq_progress_callback)(void* user_data, double done, const char* stage);
+
 /* Returns the status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
  * The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_status_get_name(maq_status status);

@@ -62,16 +62,18 @@ std::string bounds_fault(const HeadBounds& bounds) {
   return "";
 }
 
-std::string places_fault(const std::vector<NamedPoint>& places) {
-  if (places.size() > kMaxNamedPoints) {
-    return concatenate("it has ", places.size(), " places, but may have ", kMaxNamedPoints);
+std::string landmarks_fault(const std::vector<NamedPoint>& landmarks) {
+  if (landmarks.size() > kMaxNamedPoints) {
+    return concatenate("it has ", landmarks.size(), " landmarks, but may have ", kMaxNamedPoints);
   }
   std::set<std::string> names;
-  for (const NamedPoint& place : places) {
-    if (place.name.empty() || place.name.size() > kMaxPlaceName) return "one of its places has no name or a long one";
-    if (!names.insert(place.name).second) return concatenate("two of its places are named \"", place.name, "\"");
-    if (!are_within(place.template_point.data(), 3, 2 * kMaxHeadExtent_dm)) {
-      return concatenate("its place \"", place.name, "\" is not finite, or far away");
+  for (const NamedPoint& landmark : landmarks) {
+    if (landmark.name.empty() || landmark.name.size() > kMaxLandmarkName)
+      return "one of its landmarks has no name or a long one";
+    if (!names.insert(landmark.name).second)
+      return concatenate("two of its landmarks are named \"", landmark.name, "\"");
+    if (!are_within(landmark.template_point.data(), 3, 2 * kMaxHeadExtent_dm)) {
+      return concatenate("its landmark \"", landmark.name, "\" is not finite, or far away");
     }
   }
   return "";
@@ -85,13 +87,13 @@ void check_head_prior(const HeadPrior& prior) {
   check_fault(cut_fault(prior.cut));
   check_fault(bounds_fault(prior.bounds));
   check_anchors(prior.anchors, size_t(prior.shape_codes()));
-  check_fault(places_fault(prior.places));
+  check_fault(landmarks_fault(prior.landmarks));
 }
 
 const NamedPoint* find_place(const HeadPrior& prior, const std::string& name) {
-  const auto found = std::find_if(prior.places.begin(), prior.places.end(),
-                                  [&](const NamedPoint& place) { return place.name == name; });
-  return found == prior.places.end() ? nullptr : &*found;
+  const auto found = std::find_if(prior.landmarks.begin(), prior.landmarks.end(),
+                                  [&](const NamedPoint& landmark) { return landmark.name == name; });
+  return found == prior.landmarks.end() ? nullptr : &*found;
 }
 
 }  // namespace maq::head

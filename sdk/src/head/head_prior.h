@@ -13,8 +13,8 @@
 namespace maq::head {
 
 inline constexpr size_t kMinHeadAnchors = 4, kMaxHeadAnchors = 16384;
-inline constexpr size_t kMaxNamedPoints = 256, kMaxPlaceName = 64;  // names in bytes
-inline constexpr float kMaxHeadExtent_dm = 8;                       // of the domain, along each axis, from the origin
+inline constexpr size_t kMaxNamedPoints = 256, kMaxLandmarkName = 64;  // names in bytes
+inline constexpr float kMaxHeadExtent_dm = 8;  // of the domain, along each axis, from the origin
 
 // Where a head ends, below the chin. The distance of a head is max(the field's, that to this plane).
 struct CutPlane {
@@ -39,7 +39,7 @@ struct HeadAnchors {
   size_t count() const { return sigma.size(); }
 };
 
-// A place that has a name: "nose_tip", "chin", "pupil_left", "pupil_right", "ear_top_left", …
+// A named landmark: "nose_tip", "chin", "pupil_left", "pupil_right", "ear_top_left", …
 struct NamedPoint {
   std::string name;
   std::array<float, 3> template_point{};
@@ -54,26 +54,26 @@ struct HeadPrior {
   CutPlane cut;
   HeadBounds bounds;
   HeadAnchors anchors;
-  std::vector<NamedPoint> places;
+  std::vector<NamedPoint> landmarks;
 
   int shape_codes() const { return bases.shape_codes(); }
   int colour_codes() const { return bases.colour_codes(); }
 };
 
 // What is wrong with such a part of a prior or of a head: "its domain is …"; empty where nothing is. A cut's normal has
-// length 1 (within 1e-3); bounds hold 0 and end within kMaxHeadExtent_dm; names have 1 to kMaxPlaceName bytes, no two
-// are alike, and places lie within twice kMaxHeadExtent_dm.
+// length 1 (within 1e-3); bounds hold 0 and end within kMaxHeadExtent_dm; names have 1 to kMaxLandmarkName bytes, no
+// two are alike, and landmarks lie within twice kMaxHeadExtent_dm.
 std::string cut_fault(const CutPlane& cut);
 std::string bounds_fault(const HeadBounds& bounds);
-std::string places_fault(const std::vector<NamedPoint>& places);
+std::string landmarks_fault(const std::vector<NamedPoint>& landmarks);
 
 // Throws MAQ_ERROR_BAD_BUNDLE, with what is wrong, unless all numbers are finite and sizes agree: sharpness 0.1 to 1e5,
 // the cut's normal of length 1 (within 1e-3), bounds within kMaxHeadExtent_dm around the origin, anchors within twice
 // that (the template's, the mean's), kMinHeadAnchors to kMaxHeadAnchors of them with sigmas in 1e-5..10 dm, names of 1
-// to kMaxPlaceName bytes and no two alike.
+// to kMaxLandmarkName bytes and no two alike.
 void check_head_prior(const HeadPrior& prior);
 
-// Null where no place has this name.
+// Null without a landmark of this name.
 const NamedPoint* find_place(const HeadPrior& prior, const std::string& name);
 
 }  // namespace maq::head

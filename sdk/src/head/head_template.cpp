@@ -21,14 +21,14 @@ bool are_near(const std::vector<float>& values) {
 // So that names need no escapes in files.
 bool is_plain_name(const std::string& name) {
   constexpr char kPlain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_";
-  return !name.empty() && name.size() <= kMaxPlaceName && name.find_first_not_of(kPlain) == std::string::npos;
+  return !name.empty() && name.size() <= kMaxLandmarkName && name.find_first_not_of(kPlain) == std::string::npos;
 }
 
 bool is_within(const FacialAction& action, size_t points) {
   const bool increases =
       std::adjacent_find(action.points.begin(), action.points.end(), std::greater_equal<>()) == action.points.end();
-  return increases && are_below(action.points, points) && action.moves.size() == 3 * action.points.size() &&
-         are_near(action.moves);
+  return increases && are_below(action.points, points) && action.deltas.size() == 3 * action.points.size() &&
+         are_near(action.deltas);
 }
 
 }  // namespace

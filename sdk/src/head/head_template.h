@@ -1,5 +1,5 @@
-// The template head as a mesh with texture coordinates and facial actions. Plain data; files/ reads it and registration/
-// registers it to a head.
+// The template head as a mesh with texture coordinates and facial actions. Plain data; files/ reads it and
+// registration/ registers it to a head.
 #pragma once
 
 #include <cstddef>
@@ -27,10 +27,10 @@ enum class TemplateKind : uint8_t {
 struct FacialAction {
   std::string name;              // letters, digits and _
   std::vector<uint32_t> points;  // that move, increasing
-  std::vector<float> moves;      // [points][3], dm
+  std::vector<float> deltas;     // [points][3], dm
 };
 
-// A point that lies in two places of the texture is two vertices.
+// A point with two texture coordinates is two vertices.
 struct HeadTemplate {
   std::vector<float> points;  // [count][3], dm, in the template head's frame
   std::vector<TemplateKind> kinds;

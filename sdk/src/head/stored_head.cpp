@@ -94,7 +94,7 @@ std::string stored_head_fault(const StoredHead& head) {
       (texture.side_px == 0) != texture.jpeg.empty()) {
     return concatenate("its texture has ", texture.side_px, " pixels a side and ", texture.jpeg.size(), " bytes");
   }
-  return places_fault(head.places);
+  return landmarks_fault(head.landmarks);
 }
 
 }  // namespace maq::head

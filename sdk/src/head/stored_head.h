@@ -61,7 +61,7 @@ struct StoredHead {
   CutPlane cut;
   HeadBounds bounds;
   StoredAnchors anchors;  // may be empty
-  std::vector<NamedPoint> places;
+  std::vector<NamedPoint> landmarks;
   StoredTexture texture;
   std::array<uint8_t, 32> prior_sha256{};  // of the prior's file, which the codes belong to; zeros: not known
 };

@@ -67,13 +67,13 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   scene->require_subcommand(1);
   scene->footer(
       "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
-      "  maquette scene build my-place --out my-place.maqs\n"
-      "  maquette scene render my-place.maqs --capture my-place --path through --out clip.mp4");
+      "  maquette scene build my-room --out my-room.maqs\n"
+      "  maquette scene render my-room.maqs --capture my-room --path through --out clip.mp4");
   add_scene_build_command(*scene, exit_code);
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = scene->add_subcommand("info", "Check a scene file and print what it contains");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("--json", options->json, "Also write these figures to this file");
+  command->add_option("--json", options->json, "Also write this information to this file");
   command->callback([=] { *exit_code = show(*options); });
 }

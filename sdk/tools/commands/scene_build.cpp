@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "commands/scene_commands.h"
@@ -23,10 +24,10 @@ struct BuildOptions {
   std::string ply;
   std::string json;
   int threads = 0;
-  int long_side = 640;
-  int coefficients = 8;
-  double min_variation = -1;
-  double visibility_scale = 1;
+  int long_side = 640;  // 0: photos are not scaled
+  int coefficients = 0;
+  std::optional<double> min_variation;
+  double visibility_scale = 0;
   double near_depth = 0;
   uint64_t points = 0;
   uint32_t views = 0;
@@ -41,9 +42,9 @@ int32_t show_progress(void* bar, double done, const char* what) {
 }
 
 maquette::Scene build_or_tell(const maquette::Context& context, const maq_scene_build_config& config,
-                              const maquette::Capture& capture, maq_scene_build_stats* stats, const std::string& out) {
+                              const maquette::Capture& capture, const std::string& out) {
   try {
-    return maquette::Scene(context, config, capture, stats);
+    return maquette::Scene(context, config, capture);
   } catch (const maquette::Error&) {
     if (!interrupted()) throw;
     throw std::runtime_error("Interrupted; " + out + " is as it was before.");
@@ -58,7 +59,7 @@ int build(const BuildOptions& options) {
   print_error("%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count, info.point_count);
   for (uint32_t i = 0; i < info.drop_count; ++i) {
     const maq_capture_drop drop = capture.drop(i);
-    print_error("  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
+    print_error("  dropped: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
   const std::string networks = scene_bundle_or_default(options.bundle);
   for (const std::string* path : {&options.out, &options.ply}) {
@@ -68,11 +69,13 @@ int build(const BuildOptions& options) {
   require_writable(options.json);
   ProgressBar progress("building", kPermille);
   maq_scene_build_config config = maquette::default_scene_build_config();
-  config.bundle_path = networks.c_str();
-  config.threads = options.threads;
-  config.long_side_px = options.long_side;
+  config.model.bundle_path = networks.c_str();
+  config.model.threads = options.threads;
+  config.long_side_px = options.long_side == 0 ? MAQ_SCENE_LONG_SIDE_FULL : options.long_side;
   config.coefficient_bits = options.coefficients;
-  config.min_variation = options.min_variation;
+  if (options.min_variation) {
+    config.min_variation = *options.min_variation == 0 ? MAQ_SCENE_VARIATION_ALL : *options.min_variation;
+  }
   config.visibility_scale = options.visibility_scale;
   config.near_depth = options.near_depth;
   config.max_points = options.points;
@@ -80,8 +83,8 @@ int build(const BuildOptions& options) {
   config.use_held_out = options.all_photos ? 1 : 0;
   config.progress_callback = show_progress;
   config.progress_user_data = &progress;
-  maq_scene_build_stats stats{};
-  const maquette::Scene scene = build_or_tell(context, config, capture, &stats, options.out);
+  const maquette::Scene scene = build_or_tell(context, config, capture, options.out);
+  const maq_scene_build_stats stats = scene.build_stats();
   progress.finish();
   const double before_saving_s = seconds_since_start();
   scene.save(options.out);
@@ -128,7 +131,7 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
       ->add_option("capture", options->capture,
                    "Folder with photos, a point cloud, and a COLMAP model or transforms.json")
       ->required();
-  command->add_option("-o,--out", options->out, "File of the scene: place.maqs; replaces an existing one")->required();
+  command->add_option("-o,--out", options->out, "File of the scene: room.maqs; replaces an existing one")->required();
   command->add_option(
       "--bundle", options->bundle,
       "Folder of the scene bundle; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
@@ -144,9 +147,10 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
                    "Bits of each number of a descriptor: 8, 16 or 32 (default 8)")
       ->check(CLI::IsMember({8, 16, 32}));
   command
-      ->add_option("--min-variation", options->min_variation,
-                   "Store points that vary less between photos without view dependence, for a smaller file; RMS of "
-                   "colours of 0 to 1")
+      ->add_option(
+          "--min-variation", options->min_variation,
+          "Store points that vary less between photos (RMS, colours of 0 to 1) without view dependence. Larger "
+          "values make smaller files; with 0 all points are view-dependent.")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--visibility-scale", options->visibility_scale,

@@ -42,7 +42,6 @@ struct RenderOptions {
   int repeat = 1;
   bool no_alpha = false;
   bool is_timed_clip = false;  // --seconds or --fps were given
-  std::vector<std::string> without;
 };
 
 std::optional<PictureSize> size_of(const std::string& text) {
@@ -53,22 +52,17 @@ maquette::SceneRenderer make_renderer(const maquette::Context& context, const ma
                                       const RenderOptions& options) {
   const std::string networks = scene_bundle_or_default(options.bundle);
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
-  config.bundle_path = networks.c_str();
-  config.threads = options.threads;
+  config.model.bundle_path = networks.c_str();
+  config.model.threads = options.threads;
   config.near_depth = options.near_depth;
-  for (const std::string& saving : options.without) {
-    if (saving == "culling") config.draw_unseen_blocks = 1;
-    if (saving == "tiles") config.refine_empty_parts = 1;
-  }
   return maquette::SceneRenderer(context, config, scene);
 }
 
-// The picture as it lies in the image.
-cv::Mat picture_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
+// The colours of the image, without a copy.
+cv::Mat colours_of(const maquette::Image& image) {
   size_t stride_bytes = 0;
-  const void* pixels = image.plane(MAQ_SCENE_PLANE_BGR, &stride_bytes);
-  return cv::Mat(camera.intrinsics.height_px, camera.intrinsics.width_px, CV_8UC3, const_cast<void*>(pixels),
-                 stride_bytes);
+  const void* pixels = image.plane(MAQ_IMAGE_PLANE_BGR, &stride_bytes);
+  return cv::Mat(image.height_px(), image.width_px(), CV_8UC3, const_cast<void*>(pixels), stride_bytes);
 }
 
 float median(std::vector<float> values) {
@@ -78,16 +72,16 @@ float median(std::vector<float> values) {
 }
 
 // Renders `repeat` times, fewer after an interrupt; `ms` gets the medians of the times.
-maquette::SceneImage timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
-                           nlohmann::ordered_json& ms) {
+maquette::Image timed(maquette::SceneRenderer& renderer, const maq_pinhole_camera& camera, int repeat,
+                      nlohmann::ordered_json& ms) {
   std::vector<float> total, project, shade, refine, resample;
   // The first prepares networks for its size; it is left out of the times.
   if (repeat > 1) renderer.run(camera);
-  std::unique_ptr<maquette::SceneImage> image;
+  std::unique_ptr<maquette::Image> image;
   for (int i = 0; i < repeat && (i == 0 || !interrupted()); ++i) {
     image.reset();
-    image = std::make_unique<maquette::SceneImage>(renderer.run(camera));
-    const maq_scene_image_stats stats = image->stats();
+    image = std::make_unique<maquette::Image>(renderer.run(camera));
+    const maq_scene_render_stats stats = image->scene_stats();
     total.push_back(stats.total_ms);
     project.push_back(stats.project_ms);
     shade.push_back(stats.shade_ms);
@@ -123,16 +117,17 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
   return chosen;
 }
 
-std::string picture_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
+std::string image_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
 
 int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const RenderOptions& options) {
   const std::vector<uint32_t> views = chosen_views(capture, options.views);
   const std::optional<PictureSize> size = size_of(options.size);
   std::set<std::string> names;
   for (const uint32_t index : views) {
-    const std::string name = picture_name(capture.view(index));
+    const std::string name = image_name(capture.view(index));
     if (!names.insert(name).second) {
-      throw std::runtime_error("Two photos of the capture would both be " + name + "; name one of them in --views.");
+      throw std::runtime_error("Two photos of the capture would both become " + name +
+                               "; name one of them in --views.");
     }
   }
   std::error_code error;
@@ -145,9 +140,10 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     const maq_capture_view view = capture.view(views[i]);
     const maq_pinhole_camera camera = size ? with_size(view.camera, size->width_px, size->height_px) : view.camera;
     nlohmann::ordered_json ms;
-    const maquette::SceneImage image = timed(renderer, camera, options.repeat, ms);
-    const maq_scene_image_stats stats = image.stats();
-    image.save((fs::path(options.out) / picture_name(view)).string(), !options.no_alpha);
+    const maquette::Image image = timed(renderer, camera, options.repeat, ms);
+    const maq_scene_render_stats stats = image.scene_stats();
+    image.save((fs::path(options.out) / image_name(view)).string(),
+               options.no_alpha ? MAQ_IMAGE_ALPHA_OFF : MAQ_IMAGE_ALPHA_ON);
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},
                                  {"drawn_blocks", stats.drawn_block_count},
@@ -160,7 +156,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
   }
   progress.finish();
   write_json_file(options.json, document, 2);
-  print_output("%s: %zu pictures\n", options.out.c_str(), document["views"].size());
+  print_output("%s: %zu images\n", options.out.c_str(), document["views"].size());
   return interrupted() ? 1 : 0;
 }
 
@@ -173,7 +169,7 @@ std::vector<maq_pinhole_camera> flight(const maquette::Scene& scene, const maque
   if (capture == nullptr) {
     throw std::runtime_error("--path through follows the cameras of the photos: name their folder with --capture.");
   }
-  // More stops a second would be a hurry.
+  // More stops a second would move too fast.
   constexpr double kStopsASecond = 1.5;
   const uint32_t count = capture->info().view_count;
   const auto wanted = std::clamp(uint32_t(std::lround(options.seconds * kStopsASecond)) + 1, 2u, std::max(2u, count));
@@ -193,16 +189,16 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
   ProgressBar progress("rendering", int64_t(cameras.size()));
   std::vector<float> times_ms;
   for (size_t i = 0; i < cameras.size() && !interrupted(); ++i) {
-    const maquette::SceneImage image = renderer.run(cameras[i]);
-    clip.add(frame_of(context, picture_of(image, cameras[i])));
-    times_ms.push_back(image.stats().total_ms);
+    const maquette::Image image = renderer.run(cameras[i]);
+    clip.add(frame_of(context, colours_of(image)));
+    times_ms.push_back(image.scene_stats().total_ms);
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", double(times_ms.back()));
     progress.advance(int64_t(i + 1), note);
   }
   progress.finish();
   if (interrupted()) {
-    // Half of a clip takes no whole one's place.
+    // An incomplete clip does not replace an existing file.
     throw std::runtime_error("Interrupted; " + options.out + " is as it was before.");
   }
   clip.finish();
@@ -218,14 +214,14 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
 
 int render(const RenderOptions& options) {
   if (options.views.empty() == options.path.empty()) {
-    throw std::runtime_error("Say what to render: --views with --capture for pictures, or --path for a clip.");
+    throw std::runtime_error("Say what to render: --views with --capture for images, or --path for a clip.");
   }
   if (options.path.empty() ? options.is_timed_clip : options.repeat != 1 || options.no_alpha) {
     throw std::runtime_error(options.path.empty() ? "--seconds and --fps are for clips: use them with --path."
-                                                  : "--repeat and --no-alpha are for pictures: use them with --views.");
+                                                  : "--repeat and --no-alpha are for images: use them with --views.");
   }
   if (!options.views.empty() && options.capture.empty()) {
-    throw std::runtime_error("--views are those of a capture: name its folder with --capture.");
+    throw std::runtime_error("--views needs a capture: name its folder with --capture.");
   }
   require_writable(options.json);
   catch_interrupts();
@@ -242,9 +238,9 @@ int render(const RenderOptions& options) {
 
 void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<RenderOptions>();
-  CLI::App* command = scene.add_subcommand("render", "Render a scene: pictures from given cameras, or a clip");
+  CLI::App* command = scene.add_subcommand("render", "Render a scene: images from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("-o,--out", options->out, "File of the clip, clip.mp4 or clip.avi, or folder for the pictures")
+  command->add_option("-o,--out", options->out, "File of the clip, clip.mp4 or clip.avi, or folder for the images")
       ->required();
   command
       ->add_option("--path", options->path,
@@ -255,7 +251,7 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
   command->add_option("--capture", options->capture, "Folder of the capture whose cameras are used");
   command->add_option("--views", options->views,
                       "Photos of the capture to render: held-out, all, or names with commas");
-  command->add_option("--size", options->size, "Size of the pictures, such as 640x480; default: that of the photo");
+  command->add_option("--size", options->size, "Size of the images, such as 640x480; default: the size of the photo");
   command->add_option(
       "--bundle", options->bundle,
       "Bundle that built the scene; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
@@ -263,12 +259,9 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
-  command->add_flag("--no-alpha", options->no_alpha, "Write pictures without alpha");
-  command->add_option("--repeat", options->repeat, "Render each picture N times and report median times")
+  command->add_flag("--no-alpha", options->no_alpha, "Write images without alpha");
+  command->add_option("--repeat", options->repeat, "Render each image N times and report median times")
       ->check(CLI::Range(1, 10000));
-  command->add_option("--without", options->without, "Switch off an optimisation, to measure it: culling, tiles")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"culling", "tiles"}));
   command->add_option("--json", options->json, "Write times and counts to this file");
   command->callback([=] {
     options->is_timed_clip = command->count("--seconds") + command->count("--fps") > 0;

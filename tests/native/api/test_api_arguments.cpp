@@ -324,7 +324,7 @@ TEST_F(ApiArguments, WhyNothingWasMadeIsFoundWithAndWithoutTheContext) {
   expect_text(maq_scene_builder_create(context_, nullptr, &cloud, &builder), "cloud.struct_size is 0");
   maq_scene_renderer* renderer = nullptr;
   expect_text(maq_scene_renderer_create(context_, nullptr, nullptr, &renderer), "scene is NULL");
-  expect_text(maq_scene_build(context_, nullptr, nullptr, nullptr, &scene), "capture is NULL");
+  expect_text(maq_scene_build(context_, nullptr, nullptr, &scene), "capture is NULL");
   maq_context* context = nullptr;
   EXPECT_EQ(maq_context_create(0, nullptr, &context), MAQ_ERROR_VERSION_MISMATCH);
   EXPECT_NE(std::string(maq_last_error(nullptr)).find("build the app again"), std::string::npos);

@@ -1,4 +1,4 @@
-// Pictures of heads through the C API: planes, files, cameras of photos, the pool, what is refused; previews of a fit.
+// Images of heads through the C API: planes, files, cameras of photos, the pool, what is refused; previews of a fit.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,20 +38,19 @@ class ApiHeadRendering : public testing::Test {
     desc.planes[0] = pixels.data();
     return maquette::Frame(context, desc);
   }
-  static maq_head_mesh_options coarse_mesh() {
-    maq_head_mesh_options options = maquette::default_head_mesh_options();
+  static maq_head_mesh_config coarse_mesh() {
+    maq_head_mesh_config options = maquette::default_head_mesh_config();
     options.cell_m = 0.006;
     return options;
   }
+  maquette::HeadMesh mesh() const { return maquette::HeadMesh(head, coarse_mesh()); }
   static maq_head_renderer_config coarse() {
     maq_head_renderer_config config = maquette::default_head_renderer_config();
-    static const maq_head_mesh_options mesh = coarse_mesh();
-    config.mesh = &mesh;
     config.threads = 2;
     return config;
   }
   template <class T>
-  static const T* plane(const maquette::HeadImage& image, maq_head_plane which, size_t channels, int width) {
+  static const T* plane(const maquette::Image& image, maq_image_plane which, size_t channels, int width) {
     size_t stride = 0;
     const void* pixels = image.plane(which, &stride);
     EXPECT_EQ(stride, channels * sizeof(T) * size_t(width));
@@ -68,15 +67,15 @@ class ApiHeadRendering : public testing::Test {
 };
 
 TEST_F(ApiHeadRendering, GivesPlanesOfTheHeadFromTheFront) {
-  maquette::HeadRenderer renderer(context, coarse(), head);
+  maquette::HeadRenderer renderer(context, coarse(), mesh());
   const maq_pinhole_camera camera = renderer.camera(0, 0, 160, 120);
-  const maquette::HeadImage image = renderer.run(camera);
+  const maquette::Image image = renderer.run(camera);
   const size_t middle = 60 * 160 + 80;
-  const auto* alpha = plane<uint8_t>(image, MAQ_HEAD_PLANE_ALPHA, 1, 160);
-  const auto* bgr = plane<uint8_t>(image, MAQ_HEAD_PLANE_BGR, 3, 160);
-  const auto* depth = plane<float>(image, MAQ_HEAD_PLANE_DEPTH, 1, 160);
-  const auto* normals = plane<float>(image, MAQ_HEAD_PLANE_NORMALS, 3, 160);
-  const auto* points = plane<float>(image, MAQ_HEAD_PLANE_TEMPLATE_POINTS, 3, 160);
+  const auto* alpha = plane<uint8_t>(image, MAQ_IMAGE_PLANE_ALPHA, 1, 160);
+  const auto* bgr = plane<uint8_t>(image, MAQ_IMAGE_PLANE_BGR, 3, 160);
+  const auto* depth = plane<float>(image, MAQ_IMAGE_PLANE_DEPTH, 1, 160);
+  const auto* normals = plane<float>(image, MAQ_IMAGE_PLANE_NORMALS, 3, 160);
+  const auto* points = plane<float>(image, MAQ_IMAGE_PLANE_TEMPLATE_POINTS, 3, 160);
   EXPECT_EQ(alpha[0], 0);
   EXPECT_EQ(bgr[0], 0);
   EXPECT_EQ(depth[0], 0);
@@ -96,18 +95,19 @@ TEST_F(ApiHeadRendering, ATextureIsShownInPlaceOfTheNetworksColours) {
   maq_frame_desc_init(&desc, sizeof desc);
   desc.format = MAQ_PIXEL_BGR8, desc.width_px = 320, desc.height_px = 240;
   desc.planes[0] = striped.data();
-  maq_head_config config = maquette::default_head_config();
-  config.bundle_path = kRoundHeads;
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_path = kRoundHeads;
+  config.texture = MAQ_HEAD_TEXTURE_ON;
   config.texture_px = 512;
   maquette::HeadBuilder textured(context, config);
   textured.add_photo(maquette::Frame(context, desc), known());
   maquette::Head painted = textured.fit(0);
   maq_head_renderer_config bare = coarse();
-  bare.light = 0;
-  maquette::HeadRenderer renderer(context, bare, painted);
+  bare.shading_strength = MAQ_HEAD_SHADING_STRENGTH_OFF;
+  maquette::HeadRenderer renderer(context, bare, maquette::HeadMesh(painted, coarse_mesh()));
   const maq_pinhole_camera camera = painted.camera(0);
-  const auto contrast = [&](const maquette::HeadImage& image) {
-    const auto* bgr = plane<uint8_t>(image, MAQ_HEAD_PLANE_BGR, 3, 320);
+  const auto contrast = [&](const maquette::Image& image) {
+    const auto* bgr = plane<uint8_t>(image, MAQ_IMAGE_PLANE_BGR, 3, 320);
     double low = 255, high = 0;
     for (int column = 135; column < 175; ++column) {  // the middle of the face
       const double value = bgr[3 * (120 * 320 + column)];
@@ -119,10 +119,9 @@ TEST_F(ApiHeadRendering, ATextureIsShownInPlaceOfTheNetworksColours) {
   renderer.set_shading(MAQ_HEAD_SHADING_SHAPE);
   EXPECT_LT(contrast(renderer.run(camera)), 40);
   // The template's mesh has texture coordinates of its own layout.
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
+  maq_head_mesh_config options = maquette::default_head_mesh_config();
   options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
-  bare.mesh = &options;
-  maquette::HeadRenderer of_template(context, bare, painted);
+  maquette::HeadRenderer of_template(context, bare, maquette::HeadMesh(painted, options));
   EXPECT_LT(contrast(of_template.run(camera)), 60);
 }
 
@@ -131,14 +130,14 @@ TEST_F(ApiHeadRendering, TheCameraOfAPhotoLaysTheHeadOnThePhoto) {
   EXPECT_EQ(camera.intrinsics.width_px, 320);
   EXPECT_EQ(camera.intrinsics.fx_px, camera.intrinsics.fy_px);
   EXPECT_NEAR(camera.intrinsics.fx_px, builder.photo(0).focal_px, 0.01);
-  maquette::HeadRenderer renderer(context, coarse(), head);
-  const maquette::HeadImage image = renderer.run(camera);
-  const auto* alpha = plane<uint8_t>(image, MAQ_HEAD_PLANE_ALPHA, 1, 320);
+  maquette::HeadRenderer renderer(context, coarse(), mesh());
+  const maquette::Image image = renderer.run(camera);
+  const auto* alpha = plane<uint8_t>(image, MAQ_IMAGE_PLANE_ALPHA, 1, 320);
   // The encoder sees an ellipse of that share of the crop, in the middle of the box; the neck is cut off.
   double area = 0, x = 0;
   for (int i = 0; i < 320 * 240; ++i) area += alpha[i] / 255.0, x += alpha[i] / 255.0 * (i % 320);
   const double crop_px = 1.6 * 120;
-  EXPECT_NEAR(area / (crop_px * crop_px), builder.photo(0).head_fraction, 0.06);
+  EXPECT_NEAR(area / (crop_px * crop_px), builder.photo(0).head_coverage, 0.06);
   EXPECT_NEAR(x / area, 154.5, 4);
   maq_pinhole_camera none{};
   none.struct_size = sizeof none;
@@ -148,18 +147,18 @@ TEST_F(ApiHeadRendering, TheCameraOfAPhotoLaysTheHeadOnThePhoto) {
 }
 
 TEST_F(ApiHeadRendering, ShadingsDifferAndAreSwitched) {
-  maquette::HeadRenderer renderer(context, coarse(), head);
+  maquette::HeadRenderer renderer(context, coarse(), mesh());
   const maq_pinhole_camera camera = renderer.camera(0.4, 0.1, 80, 60);
   std::vector<std::vector<uint8_t>> seen;
   for (const maq_head_shading shading : {MAQ_HEAD_SHADING_COLOUR, MAQ_HEAD_SHADING_SHAPE, MAQ_HEAD_SHADING_NORMALS,
                                          MAQ_HEAD_SHADING_TEMPLATE, MAQ_HEAD_SHADING_DEPTH}) {
     renderer.set_shading(shading);
-    const maquette::HeadImage image = renderer.run(camera);
-    const auto* bgr = plane<uint8_t>(image, MAQ_HEAD_PLANE_BGR, 3, 80);
+    const maquette::Image image = renderer.run(camera);
+    const auto* bgr = plane<uint8_t>(image, MAQ_IMAGE_PLANE_BGR, 3, 80);
     seen.emplace_back(bgr, bgr + size_t(80 * 60 * 3));
     EXPECT_EQ(std::count(seen.begin(), seen.end(), seen.back()), 1) << int(shading);
   }
-  for (const int wrong : {0, 6}) {
+  for (const int wrong : {-1, 5}) {
     EXPECT_EQ(maq_head_renderer_set_shading(renderer.get(), maq_head_shading(wrong)), MAQ_ERROR_INVALID_ARGUMENT);
     expect_text("shading is ");
   }
@@ -167,41 +166,43 @@ TEST_F(ApiHeadRendering, ShadingsDifferAndAreSwitched) {
 
 TEST_F(ApiHeadRendering, ImagesAreSavedWithAndWithoutAlpha) {
   const TempFolder folder;
-  maquette::HeadRenderer renderer(context, coarse(), head);
-  const maquette::HeadImage image = renderer.run(renderer.camera(0, 0, 64, 48));
-  image.save(folder.file("a.png"), true);
+  maquette::HeadRenderer renderer(context, coarse(), mesh());
+  const maquette::Image image = renderer.run(renderer.camera(0, 0, 64, 48));
+  image.save(folder.file("a.png"), MAQ_IMAGE_ALPHA_ON);
   image.save(folder.file("b.png"));
   image.save(folder.file("c.jpg"));
   EXPECT_EQ(read_text(folder.file("a.png"))[25], 6) << "PNG's colour type with alpha";
   EXPECT_EQ(read_text(folder.file("b.png"))[25], 2);
-  EXPECT_EQ(maq_head_image_save(image.get(), folder.file("d.jpg").c_str(), 1), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_image_save(image.get(), "/nowhere/a.png", 0), MAQ_ERROR_UNWRITABLE);
-  EXPECT_EQ(maq_head_image_save(image.get(), nullptr, 0), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_image_save(image.get(), folder.file("d.jpg").c_str(), MAQ_IMAGE_ALPHA_ON), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_image_save(image.get(), "/nowhere/a.png", MAQ_IMAGE_ALPHA_OFF), MAQ_ERROR_UNWRITABLE);
+  EXPECT_EQ(maq_image_save(image.get(), nullptr, MAQ_IMAGE_ALPHA_OFF), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiHeadRendering, ImagesAreBoundedAndOutliveTheRendererAndItsHead) {
-  std::vector<maquette::HeadImage> held;
+  std::vector<maquette::Image> held;
   {
     maq_head_renderer_config config = coarse();
     config.image_pool_size = 2;
-    maquette::HeadRenderer renderer(context, config, head);
+    maquette::HeadRenderer renderer(context, config, mesh());
     head = maquette::Head(nullptr);
     const maq_pinhole_camera camera = renderer.camera(0, 0, 64, 48);
     for (int i = 0; i < 2; ++i) held.push_back(renderer.run(camera));
-    maq_head_image* image = nullptr;
+    maq_image* image = nullptr;
     EXPECT_EQ(maq_head_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_POOL_EMPTY);
     held.pop_back();
     held.push_back(renderer.run(camera));
   }
-  EXPECT_EQ(plane<uint8_t>(held[1], MAQ_HEAD_PLANE_ALPHA, 1, 64)[24 * 64 + 32], 255);
+  EXPECT_EQ(plane<uint8_t>(held[1], MAQ_IMAGE_PLANE_ALPHA, 1, 64)[24 * 64 + 32], 255);
 }
 
 TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
+  const maquette::HeadMesh shared = mesh();
   const auto refused = [&](const char* text, auto&& change) {
     maq_head_renderer_config config = coarse();
     change(config);
     maq_head_renderer* made = nullptr;
-    EXPECT_EQ(maq_head_renderer_create(context.get(), &config, head.get(), &made), MAQ_ERROR_INVALID_ARGUMENT) << text;
+    EXPECT_EQ(maq_head_renderer_create(context.get(), &config, shared.get(), &made), MAQ_ERROR_INVALID_ARGUMENT)
+        << text;
     EXPECT_EQ(made, nullptr);
     expect_text(text);
   };
@@ -209,26 +210,24 @@ TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
   int unknown = 9;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   refused("config.struct_size is 4", [](Config& c) { c.struct_size = 4; });
-  refused("config.threads", [](Config& c) { c.threads = 65; });
-  maq_head_mesh_options wrong_mesh = maquette::default_head_mesh_options();
-  wrong_mesh.cell_m = 1;
-  refused("options.cell_m is", [&](Config& c) { c.mesh = &wrong_mesh; });
-  refused("config.near_m", [](Config& c) { c.near_m = 0; });
+  refused("config.model.threads", [](Config& c) { c.threads = 65; });
+  refused("config.near_m", [](Config& c) { c.near_m = -1; });
   refused("config.near_m", [&](Config& c) { c.near_m = nan; });
   refused("config.shading", [&](Config& c) { c.shading = maq_head_shading(unknown); });
-  refused("config.light", [](Config& c) { c.light = 1.5f; });
-  refused("config.smooth_edges", [](Config& c) { c.smooth_edges = 2; });
+  refused("config.shading_strength", [](Config& c) { c.shading_strength = 1.5f; });
+  refused("config.shading_strength", [](Config& c) { c.shading_strength = -0.5f; });
+  refused("config.disable_antialiasing", [](Config& c) { c.disable_antialiasing = 2; });
   refused("config.use_background", [](Config& c) { c.use_background = -1; });
-  refused("config.image_pool_size", [](Config& c) { c.image_pool_size = 0; });
+  refused("config.image_pool_size", [](Config& c) { c.image_pool_size = 65; });
 
-  maquette::HeadRenderer renderer(context, coarse(), head);
+  maquette::HeadRenderer renderer(context, coarse(), mesh());
   const auto answer = [&](auto&& change) {
     maq_pinhole_camera camera = renderer.camera(0, 0, 64, 48);
     change(camera);
-    maq_head_image* image = nullptr;
+    maq_image* image = nullptr;
     const maq_status status = maq_head_renderer_run(renderer.get(), &camera, &image);
     EXPECT_EQ(status == MAQ_OK, image != nullptr);
-    maq_head_image_release(image);
+    maq_image_release(image);
     return status;
   };
   using Camera = maq_pinhole_camera;
@@ -241,13 +240,16 @@ TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
   EXPECT_EQ(answer([](Camera& c) { c.centre[1] = -c.centre[1]; }), MAQ_OK) << "the head is behind it";
   EXPECT_EQ(answer([](Camera& c) { c.intrinsics.fx_px = c.intrinsics.fy_px = 1e-30; }), MAQ_OK);
 
-  const maquette::HeadImage image = renderer.run(renderer.camera(0, 0, 64, 48));
+  const maquette::Image image = renderer.run(renderer.camera(0, 0, 64, 48));
   const void* plane = nullptr;
   size_t stride = 0;
   for (const int wrong : {0, 6}) {
-    EXPECT_EQ(maq_head_image_get_plane(image.get(), maq_head_plane(wrong), &plane, &stride),
-              MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(maq_image_get_plane(image.get(), maq_image_plane(wrong), &plane, &stride), MAQ_ERROR_INVALID_ARGUMENT);
   }
+  maq_scene_render_stats stats{};
+  stats.struct_size = sizeof stats;
+  EXPECT_EQ(maq_image_get_scene_stats(image.get(), &stats), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("image is of a head");
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
   EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), nan, 0, 64, 48, &camera), MAQ_ERROR_INVALID_ARGUMENT);
@@ -255,20 +257,20 @@ TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
   EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), 0, 0, 64, 48, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_renderer_run(nullptr, &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_renderer_destroy(nullptr);
-  maq_head_image_release(nullptr);
+  maq_image_release(nullptr);
 }
 
 TEST_F(ApiHeadRendering, TwoRenderersRunInTwoThreads) {
   const auto turn = [&](maquette::HeadRenderer& renderer) {
     std::vector<uint8_t> seen;
     for (int i = 0; i < 8; ++i) {
-      const maquette::HeadImage image = renderer.run(renderer.camera(0.5 * i, 0, 90, 70));
-      const auto* bgr = plane<uint8_t>(image, MAQ_HEAD_PLANE_BGR, 3, 90);
+      const maquette::Image image = renderer.run(renderer.camera(0.5 * i, 0, 90, 70));
+      const auto* bgr = plane<uint8_t>(image, MAQ_IMAGE_PLANE_BGR, 3, 90);
       seen.insert(seen.end(), bgr, bgr + size_t(90 * 70 * 3));
     }
     return seen;
   };
-  maquette::HeadRenderer one(context, coarse(), head), two(context, coarse(), head);
+  maquette::HeadRenderer one(context, coarse(), mesh()), two(context, coarse(), mesh());
   std::vector<uint8_t> by_one, by_two;
   std::thread other([&] { by_two = turn(two); });
   by_one = turn(one);
@@ -287,8 +289,9 @@ TEST_F(ApiHeadRendering, PreviewsOfAFitAreHeadsThatOutliveIt) {
   EXPECT_EQ(previews.front().info().photo_count, 1u);
   EXPECT_EQ(previews.front().landmark_names(), head.landmark_names());
   // The first is what the network saw, the last what is nearly done: its colours have come from the photo.
-  const auto red = [](maquette::Head& of) {
-    const maq_head_mesh mesh = of.mesh(coarse_mesh());
+  const auto red = [](const maquette::Head& of) {
+    const maquette::HeadMesh made(of, coarse_mesh());
+    const maq_head_mesh_data mesh = made.data();
     double sum = 0;
     for (uint32_t i = 0; i < mesh.vertex_count; ++i) sum += mesh.colours_rgb[3 * i];
     return sum / mesh.vertex_count;

@@ -24,13 +24,12 @@ double distance_m(const maquette::Head& head, const char* from, const char* to) 
 
 // What a depth camera would see of the head from where the photo was taken, were the head `larger` than it is; the
 // background is at 5 m.
-std::vector<float> depth_of_photo(const maquette::Context& context, maquette::Head& head, float larger) {
+std::vector<float> depth_of_photo(const maquette::Context& context, const maquette::Head& head, float larger) {
   maq_head_renderer_config config = maquette::default_head_renderer_config();
-  config.mesh = &coarse;
-  maquette::HeadRenderer renderer(context, config, head);
-  const maquette::HeadImage image = renderer.run(head.camera(0));
+  maquette::HeadRenderer renderer(context, config, maquette::HeadMesh(head, coarse));
+  const maquette::Image image = renderer.run(head.camera(0));
   size_t stride_bytes = 0;
-  const auto* const seen = static_cast<const float*>(image.plane(MAQ_HEAD_PLANE_DEPTH, &stride_bytes));
+  const auto* const seen = static_cast<const float*>(image.plane(MAQ_IMAGE_PLANE_DEPTH, &stride_bytes));
   EXPECT_EQ(stride_bytes, 320 * sizeof(float));
   std::vector<float> depth(seen, seen + 320 * 240);
   for (float& metres : depth) metres = metres > 0 ? larger * metres : 5;
@@ -48,7 +47,8 @@ class ApiHeadSize : public RoundHeads {
     desc.planes[0] = reinterpret_cast<const uint8_t*>(depth.data());
     return {context, desc};
   }
-  void expect_no_scale(maquette::Head& head, const maquette::Frame& of_depth, maq_status status, const char* text) {
+  void expect_no_scale(const maquette::Head& head, const maquette::Frame& of_depth, maq_status status,
+                       const char* text) {
     maq_head* scaled = nullptr;
     EXPECT_EQ(maq_head_scale_by_depth(head.get(), 0, of_depth.get(), &scaled), status);
     EXPECT_EQ(scaled, nullptr);
@@ -60,7 +60,7 @@ TEST_F(ApiHeadSize, ADistanceThatIsKnownScalesAllOfTheHead) {
   maquette::Head head = fitted();
   const double pupils_m = distance_m(head, "pupil_left", "pupil_right"), height_m = distance_m(head, "chin", "crown");
   const double factor = 0.07 / pupils_m;
-  const float crown_m = head.mesh(coarse).positions_m[2];
+  const float crown_m = Mesh(head, coarse).positions_m[2];
   const maq_pinhole_camera camera = head.camera(0);
 
   maquette::Head scaled = head.scaled_by_distance("pupil_left", "pupil_right", 0.07);
@@ -74,8 +74,8 @@ TEST_F(ApiHeadSize, ADistanceThatIsKnownScalesAllOfTheHead) {
   EXPECT_NEAR(scaled.camera(0).centre[1], factor * camera.centre[1], 1e-9) << "it still lies on the photo";
   EXPECT_EQ(scaled.camera(0).intrinsics.fx_px, camera.intrinsics.fx_px);
   // Cells are in metres, so the meshes differ, but not in what they enclose.
-  const auto height_of = [](maquette::Head& of) {
-    const maq_head_mesh mesh = of.mesh(coarse);
+  const auto height_of = [](const maquette::Head& of) {
+    const Mesh mesh(of, coarse);
     float top = -1, bottom = 1;
     for (uint32_t i = 0; i < mesh.vertex_count; ++i) {
       top = std::max(top, mesh.positions_m[3 * i + 2]);
@@ -85,7 +85,7 @@ TEST_F(ApiHeadSize, ADistanceThatIsKnownScalesAllOfTheHead) {
   };
   EXPECT_NEAR(height_of(scaled), factor * height_of(head), 1e-3);
   EXPECT_EQ(head.info().scale, MAQ_HEAD_SCALE_PRIOR) << "it stays as it is";
-  EXPECT_EQ(head.mesh(coarse).positions_m[2], crown_m);
+  EXPECT_EQ(Mesh(head, coarse).positions_m[2], crown_m);
 
   const TempFolder folder;
   scaled.save(folder.file("a.maqh"));
@@ -104,8 +104,8 @@ TEST_F(ApiHeadSize, DistancesThatCannotBeAreASentence) {
   for (const double given_m : {0.0, -0.06, 1e-4, 11.0, double(NAN), double(INFINITY)}) {
     refuse("pupil_left", "pupil_right", given_m, MAQ_ERROR_INVALID_ARGUMENT, "must be 0.001 to 10");
   }
-  refuse("pupil_left", "pupil_left", 0.06, MAQ_ERROR_INVALID_ARGUMENT, "are the same place");
-  refuse("pupil_left", "elbow", 0.06, MAQ_ERROR_NOT_FOUND, "no place named \"elbow\"");
+  refuse("pupil_left", "pupil_left", 0.06, MAQ_ERROR_INVALID_ARGUMENT, "are the same landmark");
+  refuse("pupil_left", "elbow", 0.06, MAQ_ERROR_NOT_FOUND, "no landmark named \"elbow\"");
   refuse(nullptr, "chin", 0.06, MAQ_ERROR_INVALID_ARGUMENT, "from");
   EXPECT_EQ(maq_head_scale_by_distance(head.get(), "chin", "crown", 0.2, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_scale_by_distance(nullptr, "chin", "crown", 0.2, &scaled), MAQ_ERROR_INVALID_ARGUMENT);
@@ -161,7 +161,7 @@ TEST_F(ApiHeadSize, DepthThatDoesNotShowTheHeadIsAStatus) {
   expect_no_scale(head, frame, MAQ_ERROR_INVALID_ARGUMENT, "not depth");
   std::vector<float> far_away = depth;
   for (float& metres : far_away) metres *= 1e8f;
-  expect_no_scale(head, frame_of(far_away), MAQ_ERROR_INVALID_ARGUMENT, "cannot have that size");
+  expect_no_scale(head, frame_of(far_away), MAQ_ERROR_INVALID_ARGUMENT, "cannot have this size");
   maq_head* scaled = nullptr;
   EXPECT_EQ(maq_head_scale_by_depth(head.get(), 1, frame.get(), &scaled), MAQ_ERROR_INVALID_ARGUMENT);
   expect_text("index is 1");

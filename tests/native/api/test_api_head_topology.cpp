@@ -14,8 +14,8 @@ using namespace round_heads;  // NOLINT
 
 class ApiHeadTopology : public RoundHeads {};
 
-maq_head_mesh_options of_template() {
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
+maq_head_mesh_config of_template() {
+  maq_head_mesh_config options = maquette::default_head_mesh_config();
   options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
   return options;
 }
@@ -23,7 +23,7 @@ maq_head_mesh_options of_template() {
 TEST_F(ApiHeadTopology, TheTemplatesMeshHasItsVerticesOnTheHeadAndMorphTargets) {
   maquette::Head head = fitted();
   const float crown_m = float(head.landmark("crown").point_m[2]);
-  const maq_head_mesh mesh = head.mesh(of_template());
+  const Mesh mesh(head, of_template());
   ASSERT_EQ(mesh.vertex_count, 14u * 25 + 1 + 12) << "as tests/native/generate/make_round_heads.py has it";
   EXPECT_EQ(mesh.triangle_count, 24u * (1 + 2 * 13) + 16);
   ASSERT_NE(mesh.texture_coordinates, nullptr);
@@ -36,21 +36,21 @@ TEST_F(ApiHeadTopology, TheTemplatesMeshHasItsVerticesOnTheHeadAndMorphTargets) 
     ASSERT_LE(mesh.texture_coordinates[2 * i], 1);
   }
   ASSERT_EQ(mesh.morph_target_count, 2u);
-  EXPECT_STREQ(head.morph_target(1).name, "eyeBlinkLeft");
-  const maq_head_morph_target jaw = head.morph_target(0);
+  EXPECT_STREQ(mesh.mesh.morph_target(1).name, "eyeBlinkLeft");
+  const maq_head_morph_target jaw = mesh.mesh.morph_target(0);
   EXPECT_STREQ(jaw.name, "jawOpen");
   ASSERT_GT(jaw.vertex_count, 20u);
   for (uint32_t k = 0; k < jaw.vertex_count; ++k) {
     ASSERT_LT(jaw.vertices[k], mesh.vertex_count);
     ASSERT_TRUE(k == 0 || jaw.vertices[k] > jaw.vertices[k - 1]);
-    ASSERT_NEAR(jaw.moves_m[3 * k + 2], -0.015f, 0.003f) << "15 mm, by the size of the face";
+    ASSERT_NEAR(jaw.deltas_m[3 * k + 2], -0.015f, 0.003f) << "15 mm, by the size of the face";
   }
   maq_head_morph_target target{};
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
+  EXPECT_EQ(maq_head_mesh_get_morph_target(mesh.mesh.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
   target.struct_size = sizeof target;
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 2, &target), MAQ_ERROR_INVALID_ARGUMENT);
-  head.mesh(coarse);
-  EXPECT_EQ(maq_head_get_morph_target(head.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "another mesh";
+  EXPECT_EQ(maq_head_mesh_get_morph_target(mesh.mesh.get(), 2, &target), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(Mesh(head, coarse).morph_target_count, 0u);
+  EXPECT_EQ(maq_head_mesh_get_morph_target(nullptr, 0, &target), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiHeadTopology, AnOpenedHeadTakesTheTemplateOfTheBundleThatIsNamed) {
@@ -58,42 +58,38 @@ TEST_F(ApiHeadTopology, AnOpenedHeadTakesTheTemplateOfTheBundleThatIsNamed) {
   maquette::Head head = fitted();
   head.save(folder.file("a.maqh"));
   maquette::Head opened = maquette::Head::open(context, folder.file("a.maqh"));
-  maq_head_mesh_options options = of_template();
-  maq_head_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  options.bundle_path = "/nowhere";
-  EXPECT_EQ(maq_head_get_mesh(opened.get(), &options, &mesh), MAQ_ERROR_NOT_FOUND);
-  options.bundle_path = MAQ_TEST_DATA "/tiny_head/bundle";
-  EXPECT_EQ(maq_head_get_mesh(opened.get(), &options, &mesh), MAQ_ERROR_UNSUPPORTED);
+  maq_head_mesh_config options = of_template();
+  maq_head_mesh* none = nullptr;
+  options.model.bundle_path = "/nowhere";
+  EXPECT_EQ(maq_head_mesh_create(opened.get(), &options, &none), MAQ_ERROR_NOT_FOUND);
+  options.model.bundle_path = MAQ_TEST_DATA "/tiny_head/bundle";
+  EXPECT_EQ(maq_head_mesh_create(opened.get(), &options, &none), MAQ_ERROR_UNSUPPORTED);
   expect_text("has no template head");
-  options.bundle_path = kHeadsBundle;
-  const maq_head_mesh made = opened.mesh(options), as_fitted = head.mesh(of_template());
+  options.model.bundle_path = kHeadsBundle;
+  const Mesh made(opened, options), as_fitted = Mesh(head, of_template());
   ASSERT_EQ(made.vertex_count, as_fitted.vertex_count);
   for (uint32_t i = 0; i < 3 * made.vertex_count; ++i) {
     ASSERT_NEAR(made.positions_m[i], as_fitted.positions_m[i], 5e-4) << "weights are stored as float16";
   }
-  options.bundle_path = nullptr;
-  EXPECT_EQ(opened.mesh(options).positions_m, made.positions_m) << "it has its template now";
-  opened.export_mesh(folder.file("a.glb"), options);
+  maquette::HeadMesh(opened, options).save(folder.file("a.glb"));
   EXPECT_NE(read_text(folder.file("a.glb")).find("targetNames"), std::string::npos);
 }
 
 TEST_F(ApiHeadTopology, TopologiesThatThereAreNotAndTrianglesOfTheTemplateAreASentence) {
   maquette::Head head = fitted();
-  maq_head_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  maq_head_mesh_options options = of_template();
+  maq_head_mesh* none = nullptr;
+  maq_head_mesh_config options = of_template();
   options.cell_m = 0.002;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("must be 0 with the template's topology");
+  EXPECT_EQ(maq_head_mesh_create(head.get(), &options, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("must be 0 with MAQ_HEAD_TOPOLOGY_TEMPLATE");
   options = of_template();
   options.triangle_count = 5000;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_create(head.get(), &options, &none), MAQ_ERROR_INVALID_ARGUMENT);
   const int32_t wrong = 2;
   options = of_template();
   std::memcpy(&options.topology, &wrong, sizeof wrong);
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("options.topology is 2");
+  EXPECT_EQ(maq_head_mesh_create(head.get(), &options, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("config.topology is 2");
 }
 
 }  // namespace

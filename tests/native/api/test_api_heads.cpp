@@ -25,13 +25,14 @@ constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 class ApiHeads : public RoundHeads {};
 
-TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
+TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndLandmarks) {
   builder.add_photo(frame, known);
   std::vector<double> done;
-  maquette::Head head = builder.fit(0, [&](double fraction) {
+  maquette::Head head = fit(0, [&](double fraction) {
     done.push_back(fraction);
     return true;
   });
+  EXPECT_EQ(progress.last_stage, "The head is fitted.");
   ASSERT_GE(done.size(), 2u);
   EXPECT_EQ(done.front(), 0);
   EXPECT_EQ(done.back(), 1);
@@ -53,7 +54,7 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
   EXPECT_GT(left.point_m[0], 0.02) << "left is the person's";
 
   const float crown_m = float(crown.point_m[2]);
-  const maq_head_mesh mesh = head.mesh(of_cell(0.004));
+  const Mesh mesh(head, of_cell(0.004));
   ASSERT_GT(mesh.vertex_count, 1000u);
   EXPECT_EQ(mesh.triangle_count, 2 * (mesh.vertex_count - 2)) << "closed, of one piece without holes";
   for (uint32_t i = 0; i < mesh.vertex_count; ++i) {
@@ -64,11 +65,9 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
     ASSERT_NEAR(t[2] * crown_m, p[2] * 0.121f, 1e-3f) << "on the template head the crown is at 121 mm";
   }
   for (uint32_t i = 0; i < 3 * mesh.triangle_count; ++i) ASSERT_LT(mesh.triangles[i], mesh.vertex_count);
-  const maq_head_mesh again = head.mesh(of_cell(0.004));
-  EXPECT_EQ(again.positions_m, mesh.positions_m) << "kept until another cell is asked for";
-  EXPECT_GT(head.mesh(of_cell(0.002)).vertex_count, 3 * mesh.vertex_count);
+  EXPECT_GT(Mesh(head, of_cell(0.002)).vertex_count, 3 * mesh.vertex_count);
 
-  const maq_head_stats stats = builder.stats();
+  const maq_head_build_stats stats = builder.stats();
   EXPECT_EQ(stats.photo_count, 1u);
   EXPECT_EQ(stats.used_photo_count, 1u);
   EXPECT_GT(stats.encode_ms, 0);
@@ -80,7 +79,7 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndPlaces) {
   EXPECT_EQ(photo.is_used, 1);
   EXPECT_GT(photo.focal_px, 100);
   EXPECT_LT(photo.rms_px, 2);
-  EXPECT_NEAR(photo.head_fraction, 0.22, 0.05);
+  EXPECT_NEAR(photo.head_coverage, 0.22, 0.05);
   EXPECT_EQ(std::memcmp(photo.box_px, known.box_px, sizeof photo.box_px), 0);
 }
 
@@ -90,8 +89,8 @@ TEST_F(ApiHeads, TheFitToThePixelsTakesTheColourOfThePhoto) {
   EXPECT_GT(builder.stats().step_count, 0);
   EXPECT_GT(builder.stats().fit_ms, 0);
   maquette::Head first = fitted();
-  const auto reddest = [](maquette::Head& of) {
-    const maq_head_mesh mesh = of.mesh(of_cell(0.008));
+  const auto reddest = [](const maquette::Head& of) {
+    const Mesh mesh(of, of_cell(0.008));
     double sum = 0;
     for (uint32_t i = 0; i < mesh.vertex_count; ++i) sum += mesh.colours_rgb[3 * i];
     return sum / mesh.vertex_count;
@@ -137,7 +136,7 @@ TEST_F(ApiHeads, PhotosWithoutAHeadAndThoseOfAnotherAreTold) {
   EXPECT_EQ(builder.stats().photo_count, 0u);
   builder.add_photo(blue_frame, known);
   maq_head* made = nullptr;
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &made), MAQ_ERROR_NOT_FOUND);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, &made), MAQ_ERROR_NOT_FOUND);
   EXPECT_EQ(made, nullptr);
   expect_text("does not show a head that can be fitted");
 }
@@ -217,14 +216,14 @@ TEST_F(ApiHeads, DepthIsNoPhoto) {
 
 TEST_F(ApiHeads, TimesOutOfRangeAndFitsWithoutPhotosAreRefused) {
   maq_head* made = nullptr;
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 1, nullptr, nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 1, &made), MAQ_ERROR_INVALID_ARGUMENT);
   expect_text("There are no photos");
   builder.add_photo(frame, known);
   for (const double seconds : {-1.0, 1e9, double(kNotANumber)}) {
-    EXPECT_EQ(maq_head_builder_fit(builder.get(), seconds, nullptr, nullptr, &made), MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(maq_head_builder_fit(builder.get(), seconds, &made), MAQ_ERROR_INVALID_ARGUMENT);
     expect_text("The time for the fit");
   }
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(made, nullptr);
   for (int i = 1; i < 64; ++i) builder.add_photo(frame, known);
   expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "There are 64 photos already", frame.get(), known);
@@ -237,12 +236,12 @@ TEST_F(ApiHeads, CancellingEndsWhatRunsOrElseTheNextAndNothingAfterThat) {
   builder.add_photo(frame, known);
   maq_head* made = nullptr;
   builder.cancel();
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &made), MAQ_CANCELLED);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, &made), MAQ_CANCELLED);
   // By the callback, at each of its first calls. The fit may take an hour, so that a slow machine has these calls too.
   for (int wanted = 1; wanted <= 6; ++wanted) {
     int calls = 0;
     try {
-      builder.fit(3600, [&](double) { return ++calls != wanted; });
+      fit(3600, [&](double) { return ++calls != wanted; });
       ADD_FAILURE() << "call " << wanted << " of " << calls;
     } catch (const maquette::Error& error) {
       EXPECT_EQ(error.status(), MAQ_CANCELLED) << error.what();
@@ -257,23 +256,21 @@ TEST_F(ApiHeads, CancellingEndsWhatRunsOrElseTheNextAndNothingAfterThat) {
   });
   bool was_cancelled = false;
   try {
-    builder.fit(3600, [&](double) { return has_begun = true; });
+    fit(3600, [&](double) { return has_begun = true; });
   } catch (const maquette::Error& error) {
     was_cancelled = error.status() == MAQ_CANCELLED;
   }
   other.join();
   if (!was_cancelled) {  // the fit was faster
-    EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &made), MAQ_CANCELLED);
+    EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, &made), MAQ_CANCELLED);
   }
-  struct Own {};
-  EXPECT_THROW(builder.fit(0, [](double) -> bool { throw Own(); }), Own);
   EXPECT_EQ(builder.fit(0).info().photo_count, 1u);
 }
 
 TEST_F(ApiHeads, ABuilderHasOneCallAtATimeAndItsCallbackNone) {
   builder.add_photo(frame, known);
   maq_status inside = MAQ_OK;
-  builder.fit(0, [&](double) {
+  fit(0, [&](double) {
     inside = maq_head_builder_clear(builder.get());
     return true;
   });
@@ -300,7 +297,7 @@ TEST_F(ApiHeads, HeadsOutliveTheirBuilderAndAreSavedAndOpened) {
   for (size_t axis = 0; axis < 3; ++axis) {
     EXPECT_NEAR(opened.landmark("chin").point_m[axis], head.landmark("chin").point_m[axis], 1e-4) << "as float16";
   }
-  EXPECT_NEAR(opened.mesh(of_cell(0.008)).vertex_count, head.mesh(of_cell(0.008)).vertex_count, 30);
+  EXPECT_NEAR(Mesh(opened, of_cell(0.008)).vertex_count, Mesh(head, of_cell(0.008)).vertex_count, 30);
 }
 
 TEST_F(ApiHeads, PhotosAreAddedToAHeadFromAFile) {
@@ -310,7 +307,7 @@ TEST_F(ApiHeads, PhotosAreAddedToAHeadFromAFile) {
   builder.clear();
   builder.add_head(first);
   maq_head* none = nullptr;
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, &none), MAQ_ERROR_INVALID_ARGUMENT);
   expect_text("no photos");
   builder.add_photo(frame, with_box(100, 50, 210, 200));
   const maquette::Head both = builder.fit(0);
@@ -329,7 +326,7 @@ TEST_F(ApiHeads, PhotosAreAddedToAHeadFromAFile) {
   builder.clear();
   builder.add_head(first);
   builder.add_photo(blue_frame, known);
-  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, nullptr, nullptr, &none), MAQ_ERROR_NOT_FOUND) << "a mirrored head";
+  EXPECT_EQ(maq_head_builder_fit(builder.get(), 0, &none), MAQ_ERROR_NOT_FOUND) << "a mirrored head";
   maquette::HeadBuilder of_another_bundle(context, MAQ_TEST_MODELS "/heads-int8");
   EXPECT_EQ(maq_head_builder_add_head(of_another_bundle.get(), first.get()), MAQ_ERROR_UNSUPPORTED);
   expect_text("another bundle");
@@ -340,51 +337,52 @@ TEST_F(ApiHeads, PhotosAreAddedToAHeadFromAFile) {
 TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
   maquette::Head head = fitted();
   const auto count = [&](double cell_m, uint32_t triangles) {
-    maq_head_mesh_options options = of_cell(cell_m);
+    maq_head_mesh_config options = of_cell(cell_m);
     options.triangle_count = triangles;
-    const maq_head_mesh mesh = head.mesh(options);
+    const Mesh mesh(head, options);
     EXPECT_EQ(mesh.triangle_count, 2 * (mesh.vertex_count - 2)) << "closed, of one piece without holes";
     return mesh.triangle_count;
   };
   const uint32_t full = count(0, MAQ_HEAD_ALL_TRIANGLES);
-  EXPECT_EQ(head.mesh().triangle_count, 60000u) << "the default";
-  EXPECT_GT(head.mesh().simplification_error_m, 0);
-  EXPECT_LT(head.mesh().simplification_error_m, 2e-4f);
+  EXPECT_EQ(Mesh(head).triangle_count, 60000u) << "the default";
+  EXPECT_GT(Mesh(head).simplification_error_m, 0);
+  EXPECT_LT(Mesh(head).simplification_error_m, 2e-4f);
   EXPECT_GT(full, 60000u);
   EXPECT_EQ(count(0, 2000), 2000u);
   EXPECT_EQ(count(0.0016, 0), full) << "with a cell the default is all";
-  EXPECT_EQ(head.mesh(of_cell(0.0016)).simplification_error_m, 0);
+  EXPECT_EQ(Mesh(head, of_cell(0.0016)).simplification_error_m, 0);
   EXPECT_EQ(count(0, full + 1), full);
-  maq_head_mesh mesh{};
-  mesh.struct_size = sizeof mesh;
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
-  options.triangle_count = 99;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("options.triangle_count is 99");
-  options.struct_size = 1;
-  EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("options.struct_size");
+  maq_head_mesh* none = nullptr;
+  maq_head_mesh_config config = maquette::default_head_mesh_config();
+  config.triangle_count = 99;
+  EXPECT_EQ(maq_head_mesh_create(head.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("config.triangle_count is 99");
+  config.struct_size = 1;
+  EXPECT_EQ(maq_head_mesh_create(head.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("config.struct_size");
+  EXPECT_EQ(none, nullptr);
 }
 
 TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
   const TempFolder folder;
   maquette::Head plain = fitted();
   EXPECT_EQ(plain.info().texture_px, 0u);
-  EXPECT_EQ(plain.mesh(coarse).texture_jpeg, nullptr);
-  EXPECT_EQ(plain.mesh(coarse).texture_coordinates, nullptr);
-  maq_head_config config = maquette::default_head_config();
-  config.bundle_path = kHeadsBundle;
+  EXPECT_EQ(Mesh(plain, coarse).texture_jpeg, nullptr);
+  EXPECT_EQ(Mesh(plain, coarse).texture_coordinates, nullptr);
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_path = kHeadsBundle;
+  config.texture = MAQ_HEAD_TEXTURE_ON;
   config.texture_px = 256;
   maquette::HeadBuilder textured(context, config);
   textured.add_photo(frame, known);
   maquette::Head head = textured.fit(0);
   EXPECT_EQ(head.info().texture_px, 256u);
-  const maq_head_mesh mesh = head.mesh(coarse);
+  const Mesh mesh(head, coarse);
   ASSERT_NE(mesh.texture_jpeg, nullptr);
   ASSERT_NE(mesh.texture_coordinates, nullptr);
   const std::string jpeg(reinterpret_cast<const char*>(mesh.texture_jpeg), mesh.texture_bytes);
   EXPECT_EQ(jpeg.substr(0, 2), "\xFF\xD8");
-  EXPECT_GT(mesh.vertex_count, plain.mesh(coarse).vertex_count) << "the cap's rim";
+  EXPECT_GT(mesh.vertex_count, Mesh(plain, coarse).vertex_count) << "the cap's rim";
   for (uint32_t i = 0; i < 2 * mesh.vertex_count; ++i) {
     ASSERT_GE(mesh.texture_coordinates[i], 0);
     ASSERT_LE(mesh.texture_coordinates[i], 1);
@@ -392,45 +390,50 @@ TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
   // The photo is of one colour, (140, 130, 120); the nose of the plain head is redder.
   write_text(folder.file("texture.jpg"), jpeg);
   maquette::Source source(context, "image:" + folder.file("texture.jpg"));
-  const std::optional<maquette::Frame> picture = source.next();
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->desc().width_px, 256);
-  EXPECT_EQ(picture->desc().height_px, 256);
-  const maq_frame_desc desc = picture->desc();
+  const std::optional<maquette::Frame> texture = source.next();
+  ASSERT_TRUE(texture);
+  EXPECT_EQ(texture->desc().width_px, 256);
+  EXPECT_EQ(texture->desc().height_px, 256);
+  const maq_frame_desc desc = texture->desc();
   const uint8_t* const row = desc.planes[0] + 190 * desc.stride_bytes[0];
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(row[3 * 128 + c], 120 + 10 * int(c), 6) << "B, G, R of the face";
-  head.export_mesh(folder.file("a.glb"), coarse);
+  maquette::HeadMesh(head, coarse).save(folder.file("a.glb"));
   EXPECT_NE(read_text(folder.file("a.glb")).find(jpeg), std::string::npos);
-  head.export_mesh(folder.file("a.obj"), coarse);
+  maquette::HeadMesh(head, coarse).save(folder.file("a.obj"));
   EXPECT_EQ(read_text(folder.file("a.jpg")), jpeg);
   head.save(folder.file("a.maqh"));
   maquette::Head opened = maquette::Head::open(context, folder.file("a.maqh"));
-  const maq_head_mesh again = opened.mesh(coarse);
+  const Mesh again(opened, coarse);
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(again.texture_jpeg), again.texture_bytes), jpeg);
-  config.texture_unlit = 2;
+  config.delight_texture = 2;
   maq_head_builder* none = nullptr;
   EXPECT_EQ(maq_head_builder_create(context.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("config.texture_unlit is 2");
-  config.texture_unlit = 1;
+  expect_text("config.delight_texture is 2");
+  config.delight_texture = 1;
   for (const uint32_t side : {1u, 255u, 2049u}) {
     config.texture_px = side;
     maq_head_builder* made = nullptr;
     EXPECT_EQ(maq_head_builder_create(context.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
     expect_text("config.texture_px is ");
   }
+  config.texture = MAQ_HEAD_TEXTURE_OFF;
+  config.texture_px = 256;
+  EXPECT_EQ(maq_head_builder_create(context.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_text("config.texture is not MAQ_HEAD_TEXTURE_ON");
 }
 
 TEST_F(ApiHeads, MeshesAreWrittenByTheirEnding) {
   const TempFolder folder;
   maquette::Head head = fitted();
-  for (const char* name : {"a.glb", "a.obj", "a.ply"}) head.export_mesh(folder.file(name), of_cell(0.008));
+  const maquette::HeadMesh mesh(head, of_cell(0.008));
+  for (const char* name : {"a.glb", "a.obj", "a.ply"}) mesh.save(folder.file(name));
   EXPECT_EQ(read_text(folder.file("a.glb")).substr(0, 4), "glTF");
   EXPECT_EQ(read_text(folder.file("a.ply")).substr(0, 4), "ply\n");
   EXPECT_TRUE(std::filesystem::exists(folder.file("a.mtl")));
   for (const char* name : {"a.stl", "a", "a.GLB", ""}) {
-    EXPECT_EQ(maq_head_export(head.get(), folder.file(name).c_str(), nullptr), MAQ_ERROR_INVALID_ARGUMENT) << name;
+    EXPECT_EQ(maq_head_mesh_save(mesh.get(), folder.file(name).c_str()), MAQ_ERROR_INVALID_ARGUMENT) << name;
   }
-  EXPECT_EQ(maq_head_export(head.get(), "/nowhere/a.glb", &coarse), MAQ_ERROR_UNWRITABLE);
+  EXPECT_EQ(maq_head_mesh_save(mesh.get(), "/nowhere/a.glb"), MAQ_ERROR_UNWRITABLE);
   EXPECT_EQ(maq_head_save(head.get(), "/nowhere/a.maqh"), MAQ_ERROR_UNWRITABLE);
 }
 
@@ -439,9 +442,10 @@ TEST_F(ApiHeads, AFullDiskLeavesWhatWasThere) {
   maquette::Head head = fitted();
   for (const char* name : {"a.glb", "a.ply", "a.maqh"}) write_text(folder.file(name), name);
   {
+    const maquette::HeadMesh mesh(head, coarse);
     const FileSizeLimit limit(100);
-    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.glb").c_str(), &coarse), MAQ_ERROR_UNWRITABLE);
-    EXPECT_EQ(maq_head_export(head.get(), folder.file("a.ply").c_str(), &coarse), MAQ_ERROR_UNWRITABLE);
+    EXPECT_EQ(maq_head_mesh_save(mesh.get(), folder.file("a.glb").c_str()), MAQ_ERROR_UNWRITABLE);
+    EXPECT_EQ(maq_head_mesh_save(mesh.get(), folder.file("a.ply").c_str()), MAQ_ERROR_UNWRITABLE);
     EXPECT_EQ(maq_head_save(head.get(), folder.file("a.maqh").c_str()), MAQ_ERROR_UNWRITABLE);
   }
   for (const char* name : {"a.glb", "a.ply", "a.maqh"}) EXPECT_EQ(read_text(folder.file(name)), name);
@@ -450,21 +454,26 @@ TEST_F(ApiHeads, AFullDiskLeavesWhatWasThere) {
 
 TEST_F(ApiHeads, WhatIsAskedOfAHeadIsChecked) {
   maquette::Head head = fitted();
-  maq_head_mesh mesh{};
-  EXPECT_EQ(maq_head_get_mesh(head.get(), nullptr, &mesh), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
-  mesh.struct_size = sizeof mesh;
+  maq_head_mesh* none = nullptr;
   for (const double cell_m : {-1.0, 1e-5, 1.0, double(kNotANumber)}) {
-    const maq_head_mesh_options options = of_cell(cell_m);
-    EXPECT_EQ(maq_head_get_mesh(head.get(), &options, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+    const maq_head_mesh_config config = of_cell(cell_m);
+    EXPECT_EQ(maq_head_mesh_create(head.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
     expect_text("cell_m is ");
   }
-  EXPECT_EQ(mesh.vertex_count, 0u);
-  EXPECT_EQ(maq_head_get_mesh(head.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_get_mesh(nullptr, nullptr, &mesh), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_create(head.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_create(nullptr, nullptr, &none), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(none, nullptr);
+  const maquette::HeadMesh mesh(head, coarse);
+  maq_head_mesh_data data{};
+  EXPECT_EQ(maq_head_mesh_get_data(mesh.get(), &data), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
+  EXPECT_EQ(maq_head_mesh_get_data(mesh.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_get_data(nullptr, &data), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_save(mesh.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_head_mesh_save(nullptr, "a.glb"), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_landmark landmark{};
   landmark.struct_size = sizeof landmark;
   EXPECT_EQ(maq_head_get_landmark(head.get(), "elbow", &landmark), MAQ_ERROR_NOT_FOUND);
-  expect_text("no place named \"elbow\"");
+  expect_text("no landmark named \"elbow\"");
   EXPECT_EQ(maq_head_get_landmark(head.get(), nullptr, &landmark), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_get_landmark(nullptr, "chin", &landmark), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_get_landmark_name(head.get(), 5), nullptr);
@@ -473,12 +482,12 @@ TEST_F(ApiHeads, WhatIsAskedOfAHeadIsChecked) {
   EXPECT_EQ(maq_head_get_info(head.get(), &info), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
   EXPECT_EQ(maq_head_get_info(nullptr, &info), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_save(head.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_export(head.get(), nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_photo_info photo{};
   photo.struct_size = sizeof photo;
   EXPECT_EQ(maq_head_builder_get_photo(builder.get(), 1, &photo), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_builder_cancel(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   maq_head_destroy(nullptr);
+  maq_head_mesh_destroy(nullptr);
   maq_head_builder_destroy(nullptr);
 }
 
@@ -504,16 +513,16 @@ TEST_F(ApiHeads, FilesThatAreNoHeadsAreASentence) {
 }
 
 TEST_F(ApiHeads, WrongBundlesAndSettingsAreASentence) {
-  const auto refused = [&](const maq_head_config& config, maq_status status, const char* text) {
+  const auto refused = [&](const maq_head_builder_config& config, maq_status status, const char* text) {
     maq_head_builder* made = nullptr;
     EXPECT_EQ(maq_head_builder_create(context.get(), &config, &made), status);
     EXPECT_EQ(made, nullptr);
     expect_text(text);
   };
-  maq_head_config config = maquette::default_head_config();
-  config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   refused(config, MAQ_ERROR_UNSUPPORTED, "densepose");
-  config.bundle_path = "/nowhere";
+  config.model.bundle_path = "/nowhere";
   refused(config, MAQ_ERROR_NOT_FOUND, "/nowhere");
   const TempFolder folder;
   std::filesystem::copy(kHeadsBundle, folder.path());
@@ -523,20 +532,20 @@ TEST_F(ApiHeads, WrongBundlesAndSettingsAreASentence) {
     bytes[bytes.size() / 2] = char(bytes[bytes.size() / 2] ^ 1);
     write_text(folder.file(name), bytes);
     const std::string path = folder.path().string();
-    config.bundle_path = path.c_str();
+    config.model.bundle_path = path.c_str();
     refused(config, MAQ_ERROR_BAD_BUNDLE, name);
     write_text(folder.file(name), before);
   }
-  config.bundle_path = kHeadsBundle;
-  config.threads = 65;
-  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.threads is 65");
-  config.threads = 1;
-  config.allow_spinning = 2;
-  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.allow_spinning");
-  config.allow_spinning = 0;
-  reinterpret_cast<int32_t&>(config.provider) = 9;
-  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.provider");
-  EXPECT_EQ(maq_head_config_init(&config, 4), MAQ_ERROR_INVALID_ARGUMENT);
+  config.model.bundle_path = kHeadsBundle;
+  config.model.threads = 65;
+  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.model.threads is 65");
+  config.model.threads = 1;
+  reinterpret_cast<int32_t&>(config.model.spinning) = 3;
+  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.model.spinning");
+  config.model.spinning = MAQ_SPINNING_OFF;
+  reinterpret_cast<int32_t&>(config.model.provider) = 9;
+  refused(config, MAQ_ERROR_INVALID_ARGUMENT, "config.model.provider");
+  EXPECT_EQ(maq_head_builder_config_init(&config, 4), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_photo_init(nullptr, sizeof(maq_head_photo)), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
@@ -547,16 +556,16 @@ TEST_F(ApiHeads, ABundleInMemoryAndAnyNumberOfThreadsGiveTheSame) {
   }
   std::vector<maq_memory_file> files;
   for (const auto& [name, bytes] : contents) files.push_back({name.c_str(), bytes.data(), bytes.size()});
-  maq_head_config config = maquette::default_head_config();
-  config.bundle_files = files.data();
-  config.bundle_file_count = uint32_t(files.size());
-  config.threads = 3;
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_files = files.data();
+  config.model.bundle_file_count = uint32_t(files.size());
+  config.model.threads = 3;
   maquette::HeadBuilder in_memory(context, config);
   for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
   in_memory.add_photo(frame, known);
   EXPECT_EQ(in_memory.stats().threads, 3);
   maquette::Head one = in_memory.fit(0), other = fitted();
-  const maq_head_mesh a = one.mesh(of_cell(0.008)), b = other.mesh(of_cell(0.008));
+  const Mesh a(one, of_cell(0.008)), b = Mesh(other, of_cell(0.008));
   ASSERT_EQ(a.vertex_count, b.vertex_count);
   EXPECT_EQ(std::memcmp(a.positions_m, b.positions_m, 12 * size_t(a.vertex_count)), 0);
 }
@@ -569,7 +578,7 @@ TEST_F(ApiHeads, HeadsOfOneBuilderEachMayBeMadeByManyThreads) {
       maquette::HeadBuilder own(context, kHeadsBundle);
       own.add_photo(frame, known);
       maquette::Head head = own.fit(0);
-      made += head.mesh(of_cell(0.008)).vertex_count > 100;
+      made += Mesh(head, of_cell(0.008)).vertex_count > 100;
     });
   }
   const maquette::Head shared = fitted();

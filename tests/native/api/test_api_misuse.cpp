@@ -103,7 +103,7 @@ TEST_F(ApiMisuse, WhatIsGivenBackTwiceIsTold) {
   expect_told_twice(maq_context_destroy, context, "context is a maq_context that was given back before");
   maq_capture* capture = nullptr;
   ASSERT_EQ(maq_capture_open(context_.get(), api_tiny_scene::kCapture.c_str(), &capture), MAQ_OK);
-  expect_told_twice(maq_capture_close, capture, "capture is a maq_capture that was given back before");
+  expect_told_twice(maq_capture_destroy, capture, "capture is a maq_capture that was given back before");
 }
 
 TEST_F(ApiMisuse, APoolHasAFrameThatWasReleasedTwiceOnce) {

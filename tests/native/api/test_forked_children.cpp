@@ -38,7 +38,7 @@ TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWait
   pipeline.set_model(maquette::DensePoseModel(context, config));
   const maquette::Scene scene = api_tiny_scene::ball_scene(context);
   maq_scene_renderer_config render_config = api_tiny_scene::renderer_config();
-  render_config.threads = 2;
+  render_config.model.threads = 2;
   maquette::SceneRenderer renderer(context, render_config, scene);
   renderer.run(api_tiny_scene::camera_at(0));
   maquette::Recorder recorder(context, folder.file("a.maqrec"), nullptr);
@@ -52,7 +52,7 @@ TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWait
         maq_frame* next = nullptr;
         refused.expect(maq_source_acquire_frame(live.get(), MAQ_WAIT_FOREVER, &next));
         refused.expect(maq_pipeline_set_source(pipeline.get(), "stub:people"));
-        maq_scene_image* image = nullptr;
+        maq_image* image = nullptr;
         const maq_pinhole_camera camera = api_tiny_scene::camera_at(1);
         refused.expect(maq_scene_renderer_run(renderer.get(), &camera, &image));
         maq_densepose* another = nullptr;
@@ -62,7 +62,7 @@ TEST(ForkedChildren, AreRefusedEachObjectOfTheirParentAndGiveThemBackWithoutWait
         maq_frame_release(frame->get());
         maq_recorder_destroy(recorder.get());
         maq_scene_renderer_destroy(renderer.get());
-        maq_scene_close(scene.get());
+        maq_scene_destroy(scene.get());
         maq_pipeline_destroy(pipeline.get());
         maq_source_destroy(live.get());
         maq_densepose_destroy(densepose.get());

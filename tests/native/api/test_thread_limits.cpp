@@ -101,7 +101,7 @@ TEST(ThreadLimits, AScenePassesThroughBuilderAndRendererOnTheThreadsThereAre) {
       threads_left = given;
       const std::vector<float> places = api_tiny_scene::ball(2000);
       maq_scene_build_config build = api_tiny_scene::build_config();
-      build.threads = 4;
+      build.model.threads = 4;
       maquette::SceneBuilder builder(context, build, api_tiny_scene::cloud_of(places));
       const api_tiny_scene::Photo photo;
       for (int i = 0; i < 4; ++i) {
@@ -109,7 +109,7 @@ TEST(ThreadLimits, AScenePassesThroughBuilderAndRendererOnTheThreadsThereAre) {
       }
       const maquette::Scene scene = builder.finish();
       maq_scene_renderer_config render = api_tiny_scene::renderer_config();
-      render.threads = 4;
+      render.model.threads = 4;
       maquette::SceneRenderer renderer(context, render, scene);
       renderer.run(api_tiny_scene::camera_at(0));
       return 0;

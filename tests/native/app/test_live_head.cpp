@@ -26,10 +26,10 @@ bool comes(Condition is_so) {
 // The encoder sees a head in what is not black, and another one in blue.
 maquette::LiveHeadPhoto plain_photo(uint8_t red = 140, uint8_t green = 130, uint8_t blue = 120) {
   maquette::LiveHeadPhoto photo;
-  photo.picture.resize(320, 240);
-  for (size_t i = 0; i < photo.picture.rgba.size(); i += 4) {
-    photo.picture.rgba[i] = red, photo.picture.rgba[i + 1] = green, photo.picture.rgba[i + 2] = blue;
-    photo.picture.rgba[i + 3] = 255;
+  photo.image.resize(320, 240);
+  for (size_t i = 0; i < photo.image.rgba.size(); i += 4) {
+    photo.image.rgba[i] = red, photo.image.rgba[i + 1] = green, photo.image.rgba[i + 2] = blue;
+    photo.image.rgba[i + 3] = 255;
   }
   photo.box_px = {110, 60, 200, 180};
   return photo;
@@ -66,7 +66,7 @@ TEST(LiveHead, APhotoBecomesAHeadThatIsTurnedAndLaidOverThePhoto) {
   std::atomic<int> changes{0};
   maquette::LiveHead head(context, kRoundHeads, 2, [&] { ++changes; });
   EXPECT_EQ(head.state()->phase, maquette::LiveHeadState::kNone);
-  EXPECT_EQ(head.head(), nullptr);
+  EXPECT_EQ(head.fitted(), nullptr);
   head.fit(plain_photo(), 0.5, false);
   EXPECT_EQ(head.state()->phase, maquette::LiveHeadState::kFitting);
   ASSERT_TRUE(is_ready(head)) << head.state()->text;
@@ -78,8 +78,8 @@ TEST(LiveHead, APhotoBecomesAHeadThatIsTurnedAndLaidOverThePhoto) {
   EXPECT_GT(state->pupil_distance_m, 0.03);
   EXPECT_GT(state->seconds, 0);
   EXPECT_GT(changes, 3);
-  ASSERT_NE(head.head(), nullptr);
-  EXPECT_EQ(head.head()->info().photo_count, 1u);
+  ASSERT_NE(head.fitted(), nullptr);
+  EXPECT_EQ(head.fitted()->head->info().photo_count, 1u);
 
   maquette::LiveHeadView view = small_view();
   const maquette::LiveHeadImage* image = image_of(head, view);
@@ -119,7 +119,7 @@ TEST(LiveHead, WhatThereIsOfAHeadIsShownWhileItIsFittedAndStaysWhenCancelled) {
   EXPECT_TRUE(head.state()->has_head);
   head.cancel();
   ASSERT_TRUE(is_ready(head)) << head.state()->text;
-  ASSERT_NE(head.head(), nullptr);
+  ASSERT_NE(head.fitted(), nullptr);
   EXPECT_GT(head.state()->triangle_count, 10000u);
 }
 
@@ -135,7 +135,7 @@ TEST(LiveHead, PhotosAreAddedAndThoseOfAnotherHeadAreTold) {
   ASSERT_TRUE(is_ready(head));
   EXPECT_EQ(head.state()->photo_count, 3u);
   EXPECT_EQ(head.state()->used_photo_count, 2u);
-  EXPECT_NE(head.state()->text.find("was left out"), std::string::npos) << head.state()->text;
+  EXPECT_NE(head.state()->text.find("was rejected"), std::string::npos) << head.state()->text;
   head.fit(plain_photo(), 0, false);
   ASSERT_TRUE(is_ready(head));
   EXPECT_EQ(head.state()->photo_count, 1u) << "another head";
@@ -158,7 +158,7 @@ TEST(LiveHead, FailuresAreSentencesAndTheHeadBeforeStays) {
   head.fit(plain_photo(0, 0, 0), 0, false);
   ASSERT_TRUE(is_ready(head));
   EXPECT_NE(head.state()->text.find("No head is seen"), std::string::npos);
-  EXPECT_NE(head.head(), nullptr);
+  EXPECT_NE(head.fitted(), nullptr);
 }
 
 TEST(LiveHead, EndsWhileItFits) {

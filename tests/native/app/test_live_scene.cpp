@@ -55,7 +55,7 @@ const std::string& small_room() {
   static const std::string path = [] {
     const maquette::Context context;
     maq_scene_build_config config = maquette::default_scene_build_config();
-    config.bundle_path = kBundle.c_str();
+    config.model.bundle_path = kBundle.c_str();
     config.max_views = 3;
     config.max_points = 20000;
     const std::string file = folder.file("room.maqs");

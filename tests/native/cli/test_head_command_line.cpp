@@ -36,15 +36,15 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   const Outcome result = run("grey.png --box 110,60,200,180 --out o/head.glb --save o/head.maqh --seconds 0 --cell 8");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.out.rfind("file:grey.png  head of 90 x 120 px  focal length ", 0), 0u) << result.out;
-  for (const char* text : {"px (estimated)", "size as heads are on average, give or take 4.1 %; pupils ", "mm apart",
-                           "look ", "pose ", "o/head.glb: ", " triangles", "o/head.maqh"}) {
+  for (const char* text : {"px (estimated)", "size the average of heads, +- 4.1 %; pupils ", "mm apart",
+                           "encode ", "pose ", "o/head.glb: ", " triangles", "o/head.maqh"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
   }
   EXPECT_EQ(read_text(folder_.file("o/head.glb")).substr(0, 4), "glTF");
 
   const Outcome info = run("info o/head.maqh");
   ASSERT_EQ(info.exit_code, 0) << info.err;
-  for (const char* text : {"photos     1", "as heads are on average", "pupils     ", "nose_tip", "crown"}) {
+  for (const char* text : {"photos     1", "the average of heads", "pupils     ", "nose_tip", "crown"}) {
     EXPECT_NE(info.out.find(text), std::string::npos) << text << "\n" << info.out;
   }
   const auto document = nlohmann::json::parse(run("info o/head.maqh --json").out);
@@ -57,11 +57,11 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
 TEST_F(HeadCommandLine, PhotosAreAddedToASavedHead) {
   const std::string made = "grey.png --box 110,60,200,180 --seconds 0 --save a.maqh ";
   ASSERT_EQ(run(made).exit_code, 0);
-  const Outcome added = run(made + "--add a.maqh");
+  const Outcome added = run(made + "--append a.maqh");
   ASSERT_EQ(added.exit_code, 0) << added.err;
   EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2);
-  expect_error(made + "--add none.maqh", 1, "none.maqh");
-  expect_error(made + "--add a.maqh --person all", 1, "--add is one person's head");
+  expect_error(made + "--append none.maqh", 1, "none.maqh");
+  expect_error(made + "--append a.maqh --person all", 1, "--append is one person's head");
   EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2) << "what was there stays";
 }
 
@@ -126,19 +126,19 @@ TEST_F(HeadCommandLine, AHeadIsRenderedAsPicturesAndClips) {
   EXPECT_EQ(with_alpha.at<cv::Vec4b>(2, 2)[3], 0);
   EXPECT_EQ(with_alpha.at<cv::Vec4b>(60, 80)[3], 255);
 
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (const char* options : {"", "--shading shape", "--shading normals", "--shading template", "--shading depth",
                               "--yaw 90", "--pitch 60"}) {
     const Outcome ran = run(std::string("render head.maqh --out a.png --no-alpha --background 1,2,3 --size 80x60 ") +
                             "--cell 6 " + options);
     ASSERT_EQ(ran.exit_code, 0) << options << ran.err;
-    pictures.push_back(cv::imread(folder_.file("a.png"), cv::IMREAD_UNCHANGED));
-    EXPECT_EQ(pictures.back().at<cv::Vec3b>(0, 0), cv::Vec3b(3, 2, 1)) << options;
-    for (size_t i = 0; i + 1 < pictures.size(); ++i) {
-      EXPECT_GT(cv::norm(pictures[i], pictures.back(), cv::NORM_INF), 15) << options << " is as number " << i;
+    images.push_back(cv::imread(folder_.file("a.png"), cv::IMREAD_UNCHANGED));
+    EXPECT_EQ(images.back().at<cv::Vec3b>(0, 0), cv::Vec3b(3, 2, 1)) << options;
+    for (size_t i = 0; i + 1 < images.size(); ++i) {
+      EXPECT_GT(cv::norm(images[i], images.back(), cv::NORM_INF), 15) << options << " is as number " << i;
     }
   }
-  EXPECT_NEAR(pictures[2].at<cv::Vec3b>(30, 40)[0], 250, 8) << "the face looks to the camera: blue";
+  EXPECT_NEAR(images[2].at<cv::Vec3b>(30, 40)[0], 250, 8) << "the face looks to the camera: blue";
 
   const Outcome photo = run("render head.maqh --out over.png --photo 1 --cell 6");
   ASSERT_EQ(photo.exit_code, 0) << photo.err;
@@ -188,10 +188,10 @@ TEST_F(HeadCommandLine, JsonSaysWhatWasFound) {
   EXPECT_EQ(document["out"], "head.ply");
   EXPECT_GT(document["vertices"], 100);
   EXPECT_EQ(document["threads"], 1);
-  for (const char* stage : {"find", "look", "pose", "fit", "mesh"}) EXPECT_GE(document["ms"][stage], 0) << stage;
+  for (const char* stage : {"find", "encode", "pose", "fit", "mesh"}) EXPECT_GE(document["ms"][stage], 0) << stage;
   const Outcome text = run("grey.png grey.png blue.png --out head.ply --seconds 0 --cell 8");
   EXPECT_NE(text.out.find("file:blue.png  head of "), std::string::npos) << text.out;
-  EXPECT_NE(text.out.find("left out: it shows no head, or another than the other photos"), std::string::npos);
+  EXPECT_NE(text.out.find("rejected: it shows no head, or a different person"), std::string::npos);
 }
 
 TEST_F(HeadCommandLine, PeopleAreFoundByDensePose) {

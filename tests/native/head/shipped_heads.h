@@ -82,8 +82,8 @@ class ShippedHeads : public testing::Test {
   static void expect_sound(const Made& made) {
     for (const float number : made.head.anchors.points) ASSERT_TRUE(std::isfinite(number));
     EXPECT_EQ(stored_head_fault(made.head), "");
-    EXPECT_GT(find_head_place(made.head, "pupil_left").point.x, 0.1) << "left is the person's";
-    EXPECT_LT(find_head_place(made.head, "nose_tip").point.y, -0.6) << "the face looks to -y";
+    EXPECT_GT(find_head_landmark(made.head, "pupil_left").point.x, 0.1) << "left is the person's";
+    EXPECT_LT(find_head_landmark(made.head, "nose_tip").point.y, -0.6) << "the face looks to -y";
   }
   static void expect_same(const Made& made, const Made& as, double mm, double degrees, const char* what) {
     expect_sound(made);

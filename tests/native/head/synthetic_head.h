@@ -242,7 +242,7 @@ inline HeadPrior make_prior() {
   }
   prior.sharpness = 40;
   prior.cut.point = {0, 0, -1.6};
-  prior.places = {{"nose_tip", {0, -1.17f, -0.1f}}};
+  prior.landmarks = {{"nose_tip", {0, -1.17f, -0.1f}}};
   return prior;
 }
 

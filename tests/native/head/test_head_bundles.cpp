@@ -165,7 +165,7 @@ TEST_F(HeadBundles, InMemoryAreTheSame) {
     buffers.push_back({name, bytes.back().data(), bytes.back().size()});
   }
   const maq::head::HeadBundle bundle(maq::read_bundle(buffers));
-  EXPECT_EQ(bundle.prior.places.size(), 2u);
+  EXPECT_EQ(bundle.prior.landmarks.size(), 2u);
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ StoredHead example(const FieldShape& shape, int anchors, int cameras) {
     }
     head.anchors.sigma.push_back(0.015625f);
   }
-  head.places = {{"nose_tip", {0, -1.25f, 0.1f}}, {"chin", {0, -0.9f, -0.9f}}};
+  head.landmarks = {{"nose_tip", {0, -1.25f, 0.1f}}, {"chin", {0, -0.9f, -0.9f}}};
   for (size_t i = 0; i < 32; ++i) head.prior_sha256[i] = uint8_t(7 * i);
   return head;
 }
@@ -108,9 +108,9 @@ TEST(HeadFiles, HoldAllOfAHead) {
   EXPECT_EQ(again.anchors.template_points, head.anchors.template_points);
   EXPECT_EQ(again.anchors.points, head.anchors.points);
   EXPECT_EQ(again.anchors.sigma, head.anchors.sigma);
-  ASSERT_EQ(again.places.size(), 2u);
-  EXPECT_EQ(again.places[1].name, "chin");
-  EXPECT_EQ(again.places[1].template_point, head.places[1].template_point);
+  ASSERT_EQ(again.landmarks.size(), 2u);
+  EXPECT_EQ(again.landmarks[1].name, "chin");
+  EXPECT_EQ(again.landmarks[1].template_point, head.landmarks[1].template_point);
   EXPECT_EQ(again.prior_sha256, head.prior_sha256);
   EXPECT_EQ(bytes_of(again), read_text(folder.file("a.maqh")));
 }
@@ -124,7 +124,7 @@ TEST(HeadFiles, HoldATextureOnlyWhereThereIsOne) {
   const StoredHead read = read_head(bytes.data(), bytes.size(), "a.maqh");
   EXPECT_EQ(read.texture.side_px, 512);
   EXPECT_EQ(read.texture.jpeg, head.texture.jpeg);
-  EXPECT_EQ(read.places.size(), 2u);
+  EXPECT_EQ(read.landmarks.size(), 2u);
   const auto refuse = [&](const char* text, uint32_t side_px, uint32_t count) {
     std::string changed = bytes;
     std::memcpy(changed.data() + without, &side_px, 4);
@@ -186,13 +186,13 @@ TEST(HeadFiles, WithoutCodesCamerasAnchorsAndPlacesAreRead) {
   head.code_factor = {};
   head.cameras.clear();
   head.anchors = {};
-  head.places.clear();
+  head.landmarks.clear();
   const std::string bytes = bytes_of(head);
   const StoredHead again = read_head(bytes.data(), bytes.size(), "a.maqh");
   EXPECT_TRUE(again.codes.shape.empty());
   EXPECT_TRUE(again.cameras.empty());
   EXPECT_EQ(again.anchors.count(), 0u);
-  EXPECT_TRUE(again.places.empty());
+  EXPECT_TRUE(again.landmarks.empty());
 }
 
 TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
@@ -216,7 +216,7 @@ TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation[4] += 1e-4; });
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation = {1, 0, 0, 0, 1, 0, 0, 0, -1}; });
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation[0] = NAN; });
-  refuse("finite place", [](StoredHead& h) { h.cameras[0].head_to_camera.translation.z = NAN; });
+  refuse("finite landmark", [](StoredHead& h) { h.cameras[0].head_to_camera.translation.z = NAN; });
   refuse("scale is 0", [](StoredHead& h) { h.scale.metres_per_unit = 0; });
   refuse("sigma nan", [](StoredHead& h) { h.scale.sigma = NAN; });
   refuse("source 3", [](StoredHead& h) { h.scale.source = ScaleSource(3); });
@@ -226,7 +226,7 @@ TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
   refuse("one size", [](StoredHead& h) { h.anchors.points.pop_back(); });
   refuse("anchors is not finite", [](StoredHead& h) { h.anchors.points[2] = NAN; });
   refuse("anchors is not finite", [](StoredHead& h) { h.anchors.sigma[2] = -1; });
-  refuse("two of its places", [](StoredHead& h) { h.places[1].name = "nose_tip"; });
+  refuse("two of its landmarks", [](StoredHead& h) { h.landmarks[1].name = "nose_tip"; });
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
@@ -278,10 +278,10 @@ TEST(HeadFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
   refuse("more than a head", kBad, [](auto& head) { head.shape_codes = 513; });
   refuse("more than a head", kBad, [](auto& head) { head.cameras = ~0u; });
   refuse("more than a head", kBad, [](auto& head) { head.anchors = ~0u; });
-  refuse("more than a head", kBad, [](auto& head) { head.places = 300; });
+  refuse("more than a head", kBad, [](auto& head) { head.landmarks = 300; });
   refuse("ends before", kBad, [](auto& head) { head.cameras = 256; });
   refuse("ends before", kBad, [](auto& head) { head.anchors = 16384; });
-  refuse("belong to nothing", kBad, [](auto& head) { head.places = 1; });
+  refuse("belong to nothing", kBad, [](auto& head) { head.landmarks = 1; });
   refuse("in a way", kBad, [](auto& head) { head.zero = 1; });
   refuse("in a way", kBad, [](auto& head) { head.has_texture = 2; });
   refuse("in a way", kBad, [](auto& head) { head.has_code_factor = 2; });

@@ -23,7 +23,7 @@ HeadPrior small_prior() {
     }
     prior.anchors.sigma.push_back(0.02f);
   }
-  prior.places = {{"nose_tip", {0, -1, 0}}, {"chin", {0, -0.9f, -1}}};
+  prior.landmarks = {{"nose_tip", {0, -1, 0}}, {"chin", {0, -0.9f, -1}}};
   return prior;
 }
 
@@ -58,11 +58,11 @@ TEST(HeadPrior, EachThingThatIsWrongIsNamed) {
   refuse("finite, or farther", [](HeadPrior& p) { p.anchors.linear[7] = NAN; });
   refuse("finite, or farther", [](HeadPrior& p) { p.anchors.mean[1] = 1e9f; });
   refuse("standard deviation", [](HeadPrior& p) { p.anchors.sigma[0] = 0; });
-  refuse("no name", [](HeadPrior& p) { p.places[0].name.clear(); });
-  refuse("no name", [](HeadPrior& p) { p.places[0].name = std::string(kMaxPlaceName + 1, 'a'); });
-  refuse("\"chin\"", [](HeadPrior& p) { p.places[0].name = "chin"; });
-  refuse("\"nose_tip\"", [](HeadPrior& p) { p.places[0].template_point[0] = NAN; });
-  refuse("places", [](HeadPrior& p) { p.places.resize(kMaxNamedPoints + 1); });
+  refuse("no name", [](HeadPrior& p) { p.landmarks[0].name.clear(); });
+  refuse("no name", [](HeadPrior& p) { p.landmarks[0].name = std::string(kMaxLandmarkName + 1, 'a'); });
+  refuse("\"chin\"", [](HeadPrior& p) { p.landmarks[0].name = "chin"; });
+  refuse("\"nose_tip\"", [](HeadPrior& p) { p.landmarks[0].template_point[0] = NAN; });
+  refuse("landmarks", [](HeadPrior& p) { p.landmarks.resize(kMaxNamedPoints + 1); });
 }
 
 }  // namespace

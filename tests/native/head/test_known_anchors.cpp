@@ -1,11 +1,11 @@
-// How sure a head's places are: by the prior, by photos, and without the size.
+// How sure a head's landmarks are: by the prior, by photos, and without the size.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
-#include "head/reconstruction/known_anchors.h"
 #include "head/fit/anchor_fit.h"
+#include "head/reconstruction/known_anchors.h"
 #include "head/synthetic_head.h"
 
 namespace known_anchors_tests {

@@ -69,10 +69,10 @@ TEST(PriorFiles, OfEachFormatAreWhatPythonReadsInThem) {
     expected.expect(prior.anchors.mean);
     expected.expect(prior.anchors.linear);
     expected.expect(prior.anchors.sigma);
-    ASSERT_EQ(prior.places.size(), 2u);
-    EXPECT_EQ(prior.places[0].name, "nose_tip");
-    EXPECT_EQ(prior.places[1].name, "chin");
-    for (const NamedPoint& place : prior.places) expected.expect(place.template_point);
+    ASSERT_EQ(prior.landmarks.size(), 2u);
+    EXPECT_EQ(prior.landmarks[0].name, "nose_tip");
+    EXPECT_EQ(prior.landmarks[1].name, "chin");
+    for (const NamedPoint& place : prior.landmarks) expected.expect(place.template_point);
     EXPECT_EQ(expected.at, expected.values.size());
   }
 }
@@ -112,8 +112,8 @@ TEST(PriorFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
   refuse("more than a prior", kBad, [](auto& head) { head.shape_codes = 513; });
   refuse("more than a prior", kBad, [](auto& head) { head.colour_codes = ~0u; });
   refuse("more than a prior", kBad, [](auto& head) { head.anchors = 16385; });
-  refuse("more than a prior", kBad, [](auto& head) { head.places = 257; });
-  refuse("belong to nothing", kBad, [](auto& head) { head.places = 1; });
+  refuse("more than a prior", kBad, [](auto& head) { head.landmarks = 257; });
+  refuse("belong to nothing", kBad, [](auto& head) { head.landmarks = 1; });
   refuse("in a way", kBad, [](auto& head) { head.constant_format = StoredFormat::kInt8; });
   refuse("in a way", kBad, [](auto& head) { head.bases_format = StoredFormat(3); });
   refuse("in a way", kBad, [](auto& head) { head.zero[1] = 1; });

@@ -32,7 +32,7 @@ class ShippedHeadViews : public ShippedHeads {
     HeadRenderOptions options;
     options.background_rgb = {96, 110, 118};
     HeadRenderer renderer(mesh, std::nullopt, options);
-    HeadPicture picture;
+    maq::RenderedImage picture;
     renderer.render(renderer.orbit_camera(yaw_deg / kDegrees, pitch_deg / kDegrees, kSide_px, kSide_px), picture);
     const cv::Mat bgr(kSide_px, kSide_px, CV_8UC3, picture.bgr.data());
     const cv::Rect seen = cv::boundingRect(cv::Mat(kSide_px, kSide_px, CV_8U, picture.alpha.data()));
@@ -74,14 +74,14 @@ TEST_F(ShippedHeadViews, FromEverySideThereIsAHeadThatStaysAHeadOrAStatus) {
 
 TEST_F(ShippedHeadViews, AnOpenMouthAndClosedEyesAreTheSamePerson) {
   const Made as_it_is = make(photo_);
-  HeadMesh mesh =
-      registered_template(as_it_is.head, *template_of_bundle(maq::read_bundle(MAQ_TEST_MODELS "/heads-int8")), threads_);
+  HeadMesh mesh = registered_template(as_it_is.head,
+                                      *template_of_bundle(maq::read_bundle(MAQ_TEST_MODELS "/heads-int8")), threads_);
   const View still = view_of(mesh, 10, 0);
   for (const MorphTarget& target : mesh.morph_targets) {
     if (target.name != "jawOpen" && target.name.rfind("eyeBlink", 0) != 0) continue;
     for (size_t i = 0; i < target.vertices.size(); ++i) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        mesh.positions[3 * target.vertices[i] + axis] += target.moves[3 * i + axis];
+        mesh.positions[3 * target.vertices[i] + axis] += target.deltas[3 * i + axis];
       }
     }
   }

@@ -39,7 +39,7 @@ TEST(TemplateFiles, AreWhatPythonWrote) {
   EXPECT_EQ(head.actions[0].name, "jawOpen");
   EXPECT_EQ(head.actions[0].points, (std::vector<uint32_t>{0, 3}));
   const float moves[6] = {0, 0.05f, -0.25f, 0.001f, 0, -0.3f};
-  for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(head.actions[0].moves[i], moves[i], 1e-6) << i;
+  for (size_t i = 0; i < 6; ++i) EXPECT_NEAR(head.actions[0].deltas[i], moves[i], 1e-6) << i;
   EXPECT_EQ(head.actions[1].name, "noseSneerLeft");
   EXPECT_TRUE(head.actions[1].points.empty());
 }

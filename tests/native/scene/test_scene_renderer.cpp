@@ -14,7 +14,6 @@
 namespace {
 
 using maq::PinholeCamera;
-using maq::RenderedImage;
 using maq::RenderOptions;
 using maq::Scene;
 using maq::SceneRenderer;
@@ -84,15 +83,19 @@ double psnr(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
   return sum == 0 ? 99 : 10 * std::log10(255 * 255 * double(a.size()) / sum);
 }
 
-RenderedImage render(const Scene& scene, const PinholeCamera& camera, const RenderOptions& options = {}) {
+struct Rendered : maq::RenderedImage {
+  maq::RenderCounts counts;
+};
+
+Rendered render(const Scene& scene, const PinholeCamera& camera, const RenderOptions& options = {}) {
   SceneRenderer renderer(scene, networks(), options);
-  RenderedImage picture;
-  renderer.render(camera, picture);
+  Rendered picture;
+  picture.counts = renderer.render(camera, picture);
   return picture;
 }
 
 // Everything that a picture promises whatever the camera is.
-void expect_sound(const RenderedImage& picture, const PinholeCamera& camera) {
+void expect_sound(const Rendered& picture, const PinholeCamera& camera) {
   ASSERT_EQ(picture.width_px, camera.width_px);
   ASSERT_EQ(picture.height_px, camera.height_px);
   const size_t pixels = size_t(camera.width_px) * size_t(camera.height_px);
@@ -102,7 +105,7 @@ void expect_sound(const RenderedImage& picture, const PinholeCamera& camera) {
   for (const float depth : picture.depth) ASSERT_TRUE(depth >= 0 && std::isfinite(depth));
 }
 
-void expect_same(const RenderedImage& a, const RenderedImage& b) {
+void expect_same(const Rendered& a, const Rendered& b) {
   EXPECT_EQ(a.bgr, b.bgr);
   EXPECT_EQ(a.alpha, b.alpha);
   EXPECT_EQ(a.depth, b.depth);
@@ -114,7 +117,7 @@ TEST(SceneRenderer, RendersWhatTorchRenders) {
   ASSERT_GE(views.size(), 5u);
   size_t rotated = 0;
   for (size_t i = 0; i < views.size(); ++i) {
-    const RenderedImage picture = render(scene, views[i].camera);
+    const Rendered picture = render(scene, views[i].camera);
     expect_sound(picture, views[i].camera);
     rotated += picture.counts.is_rotated ? 1 : 0;
     const double found = psnr(picture.bgr, views[i].bgr);
@@ -135,7 +138,7 @@ TEST(SceneRenderer, StoredIn8BitsItShowsNearlyTheSame) {
   double squares_16 = 0, squares_8 = 0;
   const std::vector<ExpectedView> views = views_by_torch();
   for (const ExpectedView& view : views) {
-    const RenderedImage expected = render(exact, view.camera);
+    const Rendered expected = render(exact, view.camera);
     const double found_16 = psnr(render(in_16, view.camera).bgr, expected.bgr);
     const double found_8 = psnr(render(in_8, view.camera).bgr, expected.bgr);
     std::printf("against float: int16 %.1f dB, int8 %.1f dB\n", found_16, found_8);
@@ -152,7 +155,7 @@ TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
   for (const double roll : {0.0, 0.6}) {
     PinholeCamera camera = camera_of(200, 150, 70);
     camera.rotation = rotation_of(1, 0, 0, roll);
-    const RenderedImage expected = render(scene, camera);
+    const Rendered expected = render(scene, camera);
     EXPECT_EQ(expected.counts.is_rotated, roll != 0);
     EXPECT_GT(expected.counts.shaded_points, 2000u);
     for (const int threads : {2, 3}) {
@@ -160,8 +163,8 @@ TEST(SceneRenderer, AnyNumberOfThreadsRendersTheSamePicture) {
       options.threads = threads;
       SceneRenderer renderer(scene, networks(), options);
       for (int again = 0; again < 3; ++again) {
-        RenderedImage picture;
-        renderer.render(camera, picture);
+        Rendered picture;
+        picture.counts = renderer.render(camera, picture);
         expect_same(picture, expected);
       }
     }
@@ -173,11 +176,11 @@ TEST(SceneRenderer, OneRendererShowsOneViewAfterAnotherAsNewOnesDo) {
   RenderOptions options;
   options.threads = 2;
   SceneRenderer renderer(scene, networks(), options);
-  RenderedImage picture;
+  Rendered picture;
   std::mt19937 random(8);
   for (int i = 0; i < 10; ++i) {
     const PinholeCamera camera = random_camera(random);
-    renderer.render(camera, picture);
+    picture.counts = renderer.render(camera, picture);
     expect_same(picture, render(scene, camera));
   }
 }
@@ -191,9 +194,9 @@ TEST(SceneRenderer, BlocksLeftOutChangeNothing) {
   uint64_t projected = 0, blocks = 0;
   for (int i = 0; i < 60; ++i) {
     const PinholeCamera camera = random_camera(random);
-    RenderedImage found, expected;
-    skips.render(camera, found);
-    draws.render(camera, expected);
+    Rendered found, expected;
+    found.counts = skips.render(camera, found);
+    expected.counts = draws.render(camera, expected);
     expect_same(found, expected);
     EXPECT_EQ(expected.counts.projected_blocks, scene.block_count);
     projected += found.counts.projected_blocks;
@@ -218,7 +221,7 @@ TEST(SceneRenderer, EmptyPartsLeftOutChangeNothingThatIsCovered) {
     for (const double off : {0.0, 0.12, -0.25}) {
       PinholeCamera camera = camera_of(640, 480, 60);
       camera.rotation = rotation_of(1, 0, off, roll);
-      const RenderedImage found = render(scene, camera, some), expected = render(scene, camera, all);
+      const Rendered found = render(scene, camera, some), expected = render(scene, camera, all);
       EXPECT_LE(found.counts.refined_pixels, 3 * expected.counts.refined_pixels / 4);
       EXPECT_EQ(expected.counts.refined_pixels, expected.counts.frame_pixels);
       EXPECT_EQ(found.alpha, expected.alpha);
@@ -241,7 +244,7 @@ TEST(SceneRenderer, OverABackgroundItIsBlendedByAlpha) {
   RenderOptions over;
   over.background = std::array<uint8_t, 3>{255, 0, 100};
   const PinholeCamera camera = camera_of(160, 112, 100);
-  const RenderedImage plain = render(scene, camera), found = render(scene, camera, over);
+  const Rendered plain = render(scene, camera), found = render(scene, camera, over);
   EXPECT_EQ(found.alpha, plain.alpha);
   size_t partly = 0;
   for (size_t i = 0; i < plain.alpha.size(); ++i) {
@@ -264,7 +267,7 @@ TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
     PinholeCamera camera = camera_of(50, 40, 60);
     camera.rotation = rotation_of(std::cos(roll), std::sin(roll), 0, 0);
     camera.centre = {0, 0, 100};
-    const RenderedImage picture = render(scene, camera, options);
+    const Rendered picture = render(scene, camera, options);
     expect_sound(picture, camera);
     EXPECT_EQ(picture.counts.refined_pixels, 0u);
     EXPECT_EQ(picture.counts.shaded_points, 0u);
@@ -275,7 +278,7 @@ TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
     // Without one of the app's own it is the scene's.
     Scene other = scene;
     other.background = {0.2f, 0.4f, 1.0f};
-    const RenderedImage plain = render(other, camera);
+    const Rendered plain = render(other, camera);
     const std::array<uint8_t, 3> expected = {255, 102, 51};
     for (size_t i = 0; i < plain.bgr.size(); ++i) ASSERT_EQ(plain.bgr[i], expected[i % 3]);
   }
@@ -289,7 +292,7 @@ TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
   for (const double roll : {0.0, 0.4, M_PI / 2}) {
     PinholeCamera camera = camera_of(101, 77, 50);
     camera.rotation = rotation_of(std::cos(roll / 2), 0, 0, std::sin(roll / 2));
-    const RenderedImage picture = render(scene, camera);
+    const Rendered picture = render(scene, camera);
     EXPECT_EQ(picture.counts.is_rotated, roll != 0);
     for (const float depth : picture.depth) ASSERT_NEAR(depth, 2, 1e-4);
     for (const uint8_t alpha : picture.alpha) ASSERT_EQ(alpha, 255);
@@ -303,7 +306,7 @@ TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
   PinholeCamera portrait = camera_of(64, 96, 60);
   portrait.fx_px = portrait.fy_px = level.fx_px;
   portrait.rotation = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // its right is down in the world
-  const RenderedImage expected = render(scene, level), found = render(scene, portrait);
+  const Rendered expected = render(scene, level), found = render(scene, portrait);
   EXPECT_TRUE(found.counts.is_rotated);
   EXPECT_FALSE(expected.counts.is_rotated);
   // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the
@@ -323,7 +326,7 @@ TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
 TEST(SceneRenderer, CamerasOfEveryKind) {
   const Scene scene = packed(synthetic_points(3000), maq::CoefficientFormat::kInt8);
   SceneRenderer renderer(scene, networks(), {});
-  RenderedImage picture;
+  Rendered picture;
   uint64_t shaded = 0;
   for (const double degrees : {1.0, 60.0, 170.0}) {
     for (const auto& [width, height] : {std::pair(33, 61), std::pair(1, 1), std::pair(1, 50), std::pair(64, 48)}) {
@@ -332,13 +335,13 @@ TEST(SceneRenderer, CamerasOfEveryKind) {
         camera.rotation = rotation;              // the last one looks along the up axis
         for (const double along : {0.0, 3.0}) {  // in front of the points, and among them
           camera.centre = {0.1, 0.05, along};
-          renderer.render(camera, picture);
+          picture.counts = renderer.render(camera, picture);
           expect_sound(picture, camera);
           shaded += picture.counts.shaded_points;
           PinholeCamera odd = camera;
           odd.fy_px *= 1.7;
           odd.cx_px += 2 * width;
-          renderer.render(odd, picture);
+          picture.counts = renderer.render(odd, picture);
           expect_sound(picture, odd);
         }
       }
@@ -352,7 +355,7 @@ TEST(SceneRenderer, OnePointIsOnePoint) {
   points.x[0] = points.y[0] = 0;
   for (const auto kind : {maq::CoefficientFormat::kFloat32, maq::CoefficientFormat::kInt8}) {
     const PinholeCamera camera = camera_of(65, 33, 60);
-    const RenderedImage picture = render(packed(points, kind), camera);
+    const Rendered picture = render(packed(points, kind), camera);
     EXPECT_EQ(picture.counts.shaded_points, 1u);
     EXPECT_EQ(picture.alpha[16 * 65 + 32], 255);
     EXPECT_NEAR(picture.depth[16 * 65 + 32], points.z[0], 1e-5);
@@ -370,10 +373,10 @@ TEST(SceneRenderer, ScenesInAnyUnitLookTheSame) {
     camera.centre = origin;
     return render(packed(points, maq::CoefficientFormat::kFloat32), camera);
   };
-  const RenderedImage expected = rendered(1, {0, 0, 0});
+  const Rendered expected = rendered(1, {0, 0, 0});
   for (const double unit : {std::ldexp(1.0, -10), std::ldexp(1.0, 20)}) {
     for (const double away : {0.0, 1e6}) {
-      const RenderedImage found = rendered(unit, {away * unit, 0, -away * unit});
+      const Rendered found = rendered(unit, {away * unit, 0, -away * unit});
       EXPECT_EQ(found.alpha, expected.alpha);
       EXPECT_GE(psnr(found.bgr, expected.bgr), 55);
     }

@@ -20,4 +20,4 @@ def head() -> maquette.Head:
 
 @pytest.fixture(scope="session")
 def renderer(head) -> maquette.HeadRenderer:
-    return maquette.HeadRenderer(head, cell_m=COARSE_M, threads=1)
+    return maquette.HeadRenderer(head.mesh(cell_m=COARSE_M), threads=1)

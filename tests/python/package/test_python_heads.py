@@ -18,18 +18,18 @@ pytestmark = pytest.mark.skipif(
 
 
 def test_a_photo_becomes_a_head(builder):
-    done = []
+    told = []
     builder.add_photo(GREY, BOX)
     assert not builder.photos[0].is_used
-    head = builder.fit(0, progress=done.append)
+    head = builder.fit(0, progress=lambda done, stage: told.append((done, stage)))
 
-    assert (done[0], done[-1]) == (0, 1)
+    assert [told[0], told[-1]] == [(0, "Finding cameras and a first shape."), (1, "The head is fitted.")]
     (photo,) = builder.photos
     assert photo.box_px == BOX
     assert photo.is_used
     assert photo.focal_px > 100
     assert 0 < photo.rms_px < 2
-    assert photo.head_fraction == pytest.approx(0.22, abs=0.05)
+    assert photo.head_coverage == pytest.approx(0.22, abs=0.05)
     assert builder.stats["photo_count"] == builder.stats["used_photo_count"] == 1
     assert builder.stats["step_count"] == 0
     assert builder.stats["threads"] == 1
@@ -74,35 +74,36 @@ def test_the_template_s_mesh_is_the_same_for_every_head_and_has_facial_actions(h
     assert mesh.texture_coordinates.shape == (len(mesh.positions_m), 2)
     assert mesh.texture_jpeg is None
     assert (jaw.name, wink.name) == ("jawOpen", "eyeBlinkLeft")
-    assert jaw.moves_m.shape == (len(jaw.vertices), 3)
-    assert jaw.moves_m[:, 2] == pytest.approx(-0.015, abs=0.003)
+    assert jaw.deltas_m.shape == (len(jaw.vertices), 3)
+    assert jaw.deltas_m[:, 2] == pytest.approx(-0.015, abs=0.003)
     assert np.all(mesh.template_points_m[jaw.vertices, 2] < 0)
     assert np.all(np.diff(jaw.vertices.astype(int)) > 0)
     assert head.mesh(cell_m=COARSE_M).morph_targets == ()
 
     head.save(tmp_path / "a.maqh")
     opened = maquette.Head.open(tmp_path / "a.maqh")
-    opened.export(tmp_path / "a.glb", topology="template", bundle=ROUND)
+    again = opened.mesh(topology="template", bundle=ROUND)
+    again.save(tmp_path / "a.glb")
     assert b'"targetNames":["jawOpen","eyeBlinkLeft"]' in (tmp_path / "a.glb").read_bytes()
-    np.testing.assert_array_equal(opened.mesh(topology="template").triangles, mesh.triangles)
+    np.testing.assert_array_equal(again.triangles, mesh.triangles)
     for wrong in ({"topology": "sphere"}, {"triangle_count": "most"}):
         with pytest.raises(ValueError, match="it is"):
             head.mesh(**wrong)
-    with pytest.raises(maquette.MaquetteError, match="must be 0 with the template"):
+    with pytest.raises(maquette.MaquetteError, match="must be 0 with MAQ_HEAD_TOPOLOGY_TEMPLATE"):
         head.mesh(cell_m=COARSE_M, topology="template")
 
 
-def test_places_have_names(head):
-    places = head.landmarks()
+def test_landmarks_have_names(head):
+    landmarks = head.landmarks()
 
-    assert list(places) == ["nose_tip", "chin", "crown", "pupil_left", "pupil_right"]
-    left, right = places["pupil_left"], places["pupil_right"]
+    assert list(landmarks) == ["nose_tip", "chin", "crown", "pupil_left", "pupil_right"]
+    left, right = landmarks["pupil_left"], landmarks["pupil_right"]
     assert left.point_m[0] == pytest.approx(-right.point_m[0], abs=1e-3)
     assert left.point_m[0] > 0.02  # the person's left
-    assert places["nose_tip"].point_m[1] < -0.05  # the face looks to -y
-    assert places["crown"].sigma_m == pytest.approx(0.0021, abs=1e-4)
-    assert places["nose_tip"].sigma_m == pytest.approx(0.0031, abs=1e-4)  # how far it stands out is less sure
-    np.testing.assert_array_equal(head.landmark("crown").point_m, places["crown"].point_m)
+    assert landmarks["nose_tip"].point_m[1] < -0.05  # the face looks to -y
+    assert landmarks["crown"].sigma_m == pytest.approx(0.0021, abs=1e-4)
+    assert landmarks["nose_tip"].sigma_m == pytest.approx(0.0031, abs=1e-4)  # how far it stands out is less sure
+    np.testing.assert_array_equal(head.landmark("crown").point_m, landmarks["crown"].point_m)
 
 
 def test_a_known_distance_or_depth_gives_the_size(head):
@@ -112,14 +113,14 @@ def test_a_known_distance_or_depth_gives_the_size(head):
     given = head.scaled_by_distance("pupil_left", "pupil_right", 0.07)
     assert pupils_m(given) == pytest.approx(0.07)
     assert given.info.scale == "given"
-    seen_m = maquette.HeadRenderer(given).run(given.camera()).depth_m
+    seen_m = maquette.HeadRenderer(given.mesh()).run(given.camera()).depth
     millimetres = np.where(seen_m > 0, 1000 * seen_m, 5000).astype(np.uint16)
     for depth in (np.where(seen_m > 0, seen_m, 5).astype(np.float32), millimetres, maquette.Frame(millimetres)):
         measured = head.scaled_by_depth(depth)
         assert pupils_m(measured) == pytest.approx(0.07, rel=0.005)
         assert measured.info.scale == "depth"
     assert head.info.scale == "prior"
-    with pytest.raises(maquette.MaquetteError, match="same place"):
+    with pytest.raises(maquette.MaquetteError, match="same landmark"):
         head.scaled_by_distance("chin", "chin", 0.07)
     with pytest.raises(maquette.MaquetteError, match="not depth"):
         head.scaled_by_depth(GREY)
@@ -175,7 +176,7 @@ def test_photos_are_added_to_a_head_from_a_file(builder, head, tmp_path):
     assert both.landmark("nose_tip").sigma_m < head.landmark("nose_tip").sigma_m
 
 
-def test_a_photo_without_the_head_is_left_out_and_has_no_camera(builder):
+def test_a_photo_without_the_head_is_rejected_and_has_no_camera(builder):
     blue = np.full_like(GREY, (20, 60, 200))  # in blue the bundle sees a mirrored head, which no camera explains
     builder.add_photo(blue, BOX)
     builder.add_photo(GREY, BOX)
@@ -208,7 +209,7 @@ def test_false_from_progress_cancels(builder):
     builder.add_photo(GREY, BOX)
     told = []
     with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
-        builder.fit(60, progress=lambda done: told.append(done) or len(told) < 3)
+        builder.fit(60, progress=lambda done, stage: told.append(done) or len(told) < 3)
 
     assert len(told) == 3
     assert builder.fit(0).info.photo_count == 1  # the builder stays usable
@@ -218,7 +219,7 @@ def test_what_progress_raises_comes_out_of_the_fit(builder, capsys):
     class OwnError(Exception):
         pass
 
-    def progress(done):
+    def progress(done, stage):
         raise OwnError(f"at {done}")
 
     builder.add_photo(GREY, BOX)
@@ -253,7 +254,7 @@ def test_another_thread_cancels(builder):
     waiting = threading.Thread(target=lambda: fitting.wait(60) and builder.cancel())
     waiting.start()
     with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
-        builder.fit(3600, progress=lambda done: fitting.set())
+        builder.fit(3600, progress=lambda done, stage: fitting.set())
     waiting.join()
 
 
@@ -277,8 +278,8 @@ def test_a_head_saved_and_opened_is_the_same_head(head, tmp_path):
     opened = maquette.Head.open(tmp_path / "head.maqh")
 
     assert opened.info == head.info
-    for name, place in head.landmarks().items():
-        np.testing.assert_allclose(opened.landmark(name).point_m, place.point_m, atol=1e-4)
+    for name, landmark in head.landmarks().items():
+        np.testing.assert_allclose(opened.landmark(name).point_m, landmark.point_m, atol=1e-4)
     one, other = opened.mesh(cell_m=COARSE_M), head.mesh(cell_m=COARSE_M)
     for reduced in (np.min, np.max):
         np.testing.assert_allclose(reduced(one.positions_m, 0), reduced(other.positions_m, 0), atol=2e-4)
@@ -290,8 +291,9 @@ def test_a_head_saved_and_opened_is_the_same_head(head, tmp_path):
 @pytest.mark.parametrize("ending", [".glb", ".obj", ".ply"])
 def test_files_for_other_programs_have_the_triangles_asked_for(head, tmp_path, ending):
     path = tmp_path / f"head{ending}"
-    head.export(path, 1000, cell_m=COARSE_M)
-    read, mesh = trimesh.load(path, force="mesh"), head.mesh(1000, cell_m=COARSE_M)
+    mesh = head.mesh(1000, cell_m=COARSE_M)
+    mesh.save(path)
+    read = trimesh.load(path, force="mesh")
 
     assert read.is_watertight
     assert len(read.faces) == len(mesh.triangles)
@@ -300,7 +302,7 @@ def test_files_for_other_programs_have_the_triangles_asked_for(head, tmp_path, e
 
 
 def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
-    with maquette.HeadBuilder(ROUND, threads=1, texture_px=256, texture_mirrored=True) as builder:
+    with maquette.HeadBuilder(ROUND, texture=True, threads=1, texture_px=256, mirror_unseen=1) as builder:
         builder.add_photo(GREY, BOX)
         head = builder.fit(0)
     mesh = head.mesh(cell_m=COARSE_M)
@@ -323,7 +325,8 @@ def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
     [
         (lambda b, h, r: maquette.HeadBuilder("nowhere"), maquette.MaquetteError, "nowhere.*MAQ_ERROR_NOT_FOUND"),
         (lambda b, h, r: maquette.HeadBuilder(thread=1), TypeError, "no field thread; it has .*texture_px"),
-        (lambda b, h, r: maquette.HeadBuilder(ROUND, texture_px=100), maquette.MaquetteError, "texture_px"),
+        (lambda b, h, r: maquette.HeadBuilder(ROUND, True, texture_px=100), maquette.MaquetteError, "texture_px"),
+        (lambda b, h, r: maquette.HeadBuilder(ROUND, texture_px=512), maquette.MaquetteError, "MAQ_HEAD_TEXTURE_ON"),
         (lambda b, h, r: b.add_photo(GREY, (5, 5, 5, 9)), maquette.MaquetteError, "box .* empty"),
         (lambda b, h, r: b.add_photo(GREY, (np.nan, 5, 50, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),
         (lambda b, h, r: b.add_photo(GREY, (400, 5, 500, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),
@@ -339,15 +342,15 @@ def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
         (lambda b, h, r: maquette.Head.open("nowhere.maqh"), maquette.MaquetteError, "MAQ_ERROR_NOT_FOUND"),
         (lambda b, h, r: maquette.Head.open(PHOTO), maquette.MaquetteError, "MAQ_ERROR_UNREADABLE"),
         (lambda b, h, r: h.save("/nowhere/head.maqh"), maquette.MaquetteError, "MAQ_ERROR_UNWRITABLE"),
-        (lambda b, h, r: h.export("head.stl"), maquette.MaquetteError, r"\.glb"),
+        (lambda b, h, r: h.mesh().save("head.stl"), maquette.MaquetteError, r"\.glb"),
         (lambda b, h, r: h.mesh("most"), ValueError, 'triangle_count is "most"; it is a number or "all"'),
         (lambda b, h, r: h.mesh(5), maquette.MaquetteError, "triangle_count"),
         (lambda b, h, r: h.mesh(cell_m=1), maquette.MaquetteError, "cell_m"),
         (lambda b, h, r: h.landmark("tail"), maquette.MaquetteError, "tail.*MAQ_ERROR_NOT_FOUND"),
-        (lambda b, h, r: maquette.HeadRenderer(h, "nice"), ValueError, 'shading is "nice"; .*template'),
-        (lambda b, h, r: maquette.HeadRenderer(h, background=(1, 2)), ValueError, "3 numbers: red, green, blue"),
-        (lambda b, h, r: maquette.HeadRenderer(h, light=2.0), maquette.MaquetteError, "light"),
-        (lambda b, h, r: maquette.HeadRenderer(h, lamp=2), TypeError, "no field lamp"),
+        (lambda b, h, r: maquette.HeadRenderer(h.mesh(), "nice"), ValueError, 'shading is "nice"; .*template'),
+        (lambda b, h, r: maquette.HeadRenderer(h.mesh(), background=(1, 2)), ValueError, "3 numbers: red, green, blue"),
+        (lambda b, h, r: maquette.HeadRenderer(h.mesh(), shading_strength=2.0), maquette.MaquetteError, "strength"),
+        (lambda b, h, r: maquette.HeadRenderer(h.mesh(), lamp=2), TypeError, "no field lamp"),
         (lambda b, h, r: r.set_shading("nice"), ValueError, "nice"),
         (lambda b, h, r: r.camera(np.nan), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),
         (lambda b, h, r: r.camera(0, 0, 64, -1), maquette.MaquetteError, "MAQ_ERROR_IMAGE_SIZE"),
@@ -364,24 +367,25 @@ def test_what_is_closed_is_said_and_nothing_reaches_the_library(head, renderer, 
     camera = renderer.camera(0, 0, 64, 48)
     head.save(tmp_path / "head.maqh")
     opened = maquette.Head.open(tmp_path / "head.maqh")
-    mesh, own = opened.mesh(cell_m=COARSE_M), maquette.HeadRenderer(opened, cell_m=COARSE_M)
+    mesh = opened.mesh(cell_m=COARSE_M)
+    own, triangles = maquette.HeadRenderer(mesh), mesh.triangles
     builder = maquette.HeadBuilder(ROUND, threads=1)
-    for closed in (opened, builder):
+    for closed in (opened, builder, mesh):
         closed.close()
         closed.close()
     calls = (
         lambda: builder.add_photo(GREY), lambda: builder.fit(0), lambda: builder.clear(), lambda: builder.cancel(),
         lambda: builder.photos, lambda: builder.stats, lambda: opened.info, lambda: opened.mesh(),
         lambda: opened.landmark("chin"), lambda: opened.landmarks(), lambda: opened.camera(),
-        lambda: opened.save(tmp_path / "a.maqh"), lambda: opened.export(tmp_path / "a.ply"),
-        lambda: maquette.HeadRenderer(opened),
+        lambda: opened.save(tmp_path / "a.maqh"), lambda: mesh.save(tmp_path / "a.ply"), lambda: mesh.normals,
+        lambda: maquette.HeadRenderer(mesh),
     )  # fmt: skip
     for call in calls:
-        with pytest.raises(maquette.MaquetteError, match=r"This Head(Builder)? is closed"):
+        with pytest.raises(maquette.MaquetteError, match=r"This Head(Builder|Mesh)? is closed"):
             call()
-    assert own.run(camera).alpha.any()  # a renderer needs its head no longer
+    assert own.run(camera).alpha.any()  # a renderer does not need its mesh
     own.close()
     for call in (lambda: own.run(camera), lambda: own.camera(), lambda: own.set_shading("shape")):
         with pytest.raises(maquette.MaquetteError, match="This HeadRenderer is closed"):
             call()
-    assert len(mesh.triangles)  # copies stay
+    assert len(triangles)  # copies stay

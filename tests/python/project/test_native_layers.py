@@ -95,9 +95,10 @@ MAY_INCLUDE = {
     "api": SYSTEMS | {"pipeline"},
     "api/densepose": BASE | DENSEPOSE | {"api", "densepose", "pipeline"},
     "api/edges": BASE | CURVES | {"api", "edges/files", "edges/fusion", "edges/measuring", "pipeline"},
-    "api/head": SYSTEMS | {"api"},
+    "api/head": SYSTEMS | {"api", "api/image"},
+    "api/image": BASE | {"api"},
     "api/prediction": SYSTEMS | {"api", "concealment", "pipeline"},
-    "api/scene": SCENE | {"api"},
+    "api/scene": SCENE | {"api", "api/image"},
 }  # fmt: skip
 
 # Each folder of sdk/tools, and those that its files may include beside their own; "." is sdk/tools itself, without the

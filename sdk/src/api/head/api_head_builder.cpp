@@ -5,6 +5,7 @@
 #include "api/bundle_argument.h"
 #include "api/frame_handle.h"
 #include "api/head/head_handle.h"
+#include "api/model_options.h"
 #include "core/worker_threads.h"
 #include "head/reconstruction/head_builder.h"
 #include "nn/provider.h"
@@ -13,10 +14,11 @@ using namespace maq;
 
 namespace {
 
-maq_head_config default_head_builder_config() {
-  maq_head_config config{};
+constexpr int kDefaultTexture_px = 1024;
+
+maq_head_builder_config default_head_builder_config() {
+  maq_head_builder_config config{};
   config.struct_size = sizeof config;
-  config.allow_spinning = 1;
   return config;
 }
 
@@ -26,23 +28,46 @@ maq_head_photo default_photo() {
   return photo;
 }
 
-SessionSettings session_settings(const maq_head_config& config) {
-  require_threads("config.threads", config.threads, kMaxThreads);
-  require_range("config.allow_spinning", config.allow_spinning, 0, 1);
-  require_provider("config.provider", config.provider);
-  return {config.threads != 0 ? config.threads : default_threads(), config.allow_spinning == 1};
+head::TextureOptions texture_options(const maq_head_builder_config& config) {
+  require_range("config.texture", number_in(config.texture), int32_t(MAQ_HEAD_TEXTURE_DEFAULT),
+                int32_t(MAQ_HEAD_TEXTURE_ON));
+  require_range("config.mirror_unseen", config.mirror_unseen, 0, 1);
+  require_range("config.delight_texture", config.delight_texture, 0, 1);
+  head::TextureOptions options{kDefaultTexture_px, config.mirror_unseen == 1, config.delight_texture == 1};
+  if (config.texture_px != 0) {
+    require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),
+                  uint32_t(head::kMaxTexture_px));
+    options.side_px = int(config.texture_px);
+  }
+  if (config.texture == MAQ_HEAD_TEXTURE_ON) return options;
+  if (config.texture_px != 0 || options.mirror_unseen || options.delight) {
+    throw ArgumentError(
+        "config.texture_px, mirror_unseen or delight_texture is set, but config.texture is not MAQ_HEAD_TEXTURE_ON; "
+        "set "
+        "it, or leave them 0.");
+  }
+  options.side_px = 0;
+  return options;
+}
+
+// The stage of a fit of which the fraction `done` is finished.
+const char* stage_of_fit(double done) {
+  if (done <= 0) return "Finding cameras and a first shape.";
+  return done < 1 ? "Fitting shape and colours to the pixels." : "The head is fitted.";
 }
 
 }  // namespace
 
 struct maq_head_builder : HandleOf<HandleKind::kHeadBuilder> {
-  maq_head_builder(std::shared_ptr<ContextState> of, std::unique_ptr<head::HeadBuilder> made)
-      : state(std::move(of)), builder(std::move(made)) {}
+  maq_head_builder(std::shared_ptr<ContextState> of, std::unique_ptr<head::HeadBuilder> made,
+                   head::HeadBuilder::Progress wanted)
+      : state(std::move(of)), builder(std::move(made)), progress(std::move(wanted)) {}
   std::shared_ptr<ContextState> state;
   std::unique_ptr<head::HeadBuilder> builder;
+  head::HeadBuilder::Progress progress;  // may be empty
 };
 
-maq_status maq_head_config_init(maq_head_config* config, uint32_t struct_size) {
+maq_status maq_head_builder_config_init(maq_head_builder_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_head_builder_config());
 }
 
@@ -50,27 +75,30 @@ maq_status maq_head_photo_init(maq_head_photo* photo, uint32_t struct_size) {
   return init_config(__func__, photo, struct_size, default_photo(), "photo");
 }
 
-maq_status maq_head_builder_create(maq_context* context, const maq_head_config* given, maq_head_builder** builder) {
+maq_status maq_head_builder_create(maq_context* context, const maq_head_builder_config* given,
+                                   maq_head_builder** builder) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(builder, "builder");
-    const maq_head_config config = read_config(given, "config", default_head_builder_config());
-    SessionSettings settings = session_settings(config);
-    if (config.texture_px != 0) {
-      require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),
-                    uint32_t(head::kMaxTexture_px));
-    }
-    require_range("config.texture_mirrored", config.texture_mirrored, 0, 1);
-    require_range("config.texture_unlit", config.texture_unlit, 0, 1);
-    const head::TextureOptions texture{int(config.texture_px), config.texture_mirrored == 1, config.texture_unlit == 1};
-    Bundle bundle = read_bundle_argument(config, "config", kHeadsBundle);
+    const maq_head_builder_config config = read_config(given, "config", default_head_builder_config());
+    require_model_options("config.model", config.model);
+    const head::TextureOptions texture = texture_options(config);
+    Bundle bundle = read_bundle_argument(config.model, "config.model", kHeadsBundle);
     const Manifest manifest = bundle.manifest;
     const auto runtime = context->state->onnxruntime();
-    settings.provider = available_provider(*runtime, config.provider);
+    SessionSettings settings{config.model.threads != 0 ? config.model.threads : default_threads(),
+                             may_spin(config.model)};
+    settings.provider = available_provider(*runtime, config.model.provider);
     auto made = std::make_unique<head::HeadBuilder>(runtime, std::move(bundle), settings, texture);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
                                 ") loaded, ", made->threads(), " thread(s)");
-    *builder = new maq_head_builder(context->state, std::move(made));
+    head::HeadBuilder::Progress progress;
+    if (config.progress_callback != nullptr) {
+      progress = [callback = config.progress_callback, user_data = config.progress_user_data](double done) {
+        return callback(user_data, done, stage_of_fit(done)) != 0;
+      };
+    }
+    *builder = new maq_head_builder(context->state, std::move(made), std::move(progress));
     return MAQ_OK;
   });
 }
@@ -105,13 +133,10 @@ maq_status maq_head_builder_clear(maq_head_builder* builder) {
   });
 }
 
-maq_status maq_head_builder_fit(maq_head_builder* builder, double seconds, maq_head_progress_callback progress,
-                                void* user_data, maq_head** head) {
+maq_status maq_head_builder_fit(maq_head_builder* builder, double seconds, maq_head** head) {
   return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(head, "head");
-    head::HeadBuilder::Progress report;
-    if (progress != nullptr) report = [&](double done) { return progress(user_data, done) != 0; };
-    head::StoredHead fitted = builder->builder->fit(seconds, report);
+    head::StoredHead fitted = builder->builder->fit(seconds, builder->progress);
     *head = new maq_head(std::move(fitted), builder->builder->threads(), builder->builder->template_head());
     return MAQ_OK;
   });
@@ -140,10 +165,10 @@ maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interv
   });
 }
 
-maq_status maq_head_builder_get_stats(const maq_head_builder* builder, maq_head_stats* stats) {
+maq_status maq_head_builder_get_stats(const maq_head_builder* builder, maq_head_build_stats* stats) {
   return guarded_alone(builder, "builder", __func__, [&] {
     const head::HeadBuildStats& from = builder->builder->stats();
-    maq_head_stats filled{};
+    maq_head_build_stats filled{};
     filled.photo_count = uint32_t(builder->builder->photo_count());
     filled.used_photo_count = uint32_t(from.used_photos);
     filled.encode_ms = float(from.encode_ms);
@@ -164,7 +189,7 @@ maq_status maq_head_builder_get_photo(const maq_head_builder* builder, uint32_t 
     const head::PhotoFound& from = builder->builder->found(index);
     maq_head_photo_info filled{};
     std::copy(from.box_px.begin(), from.box_px.end(), filled.box_px);
-    filled.head_fraction = float(from.head_fraction);
+    filled.head_coverage = float(from.head_coverage);
     filled.is_used = from.is_used ? 1 : 0;
     filled.focal_px = float(from.focal_px);
     filled.rms_px = float(from.rms_px);

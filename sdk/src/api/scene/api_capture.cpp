@@ -20,7 +20,7 @@ maq_status maq_capture_open(maq_context* context, const char* folder, maq_captur
   });
 }
 
-void maq_capture_close(maq_capture* capture) { destroy(capture, "capture", __func__); }
+void maq_capture_destroy(maq_capture* capture) { destroy(capture, "capture", __func__); }
 
 maq_status maq_capture_get_info(const maq_capture* capture, maq_capture_info* info) {
   return guarded(capture, __func__, [&] {

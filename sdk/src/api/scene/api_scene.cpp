@@ -27,6 +27,8 @@ maq_status maq_scene_open_memory(maq_context* context, const void* data, size_t 
   });
 }
 
+void maq_scene_destroy(maq_scene* scene) { destroy(scene, "scene", __func__); }
+
 maq_status maq_scene_save(const maq_scene* scene, const char* path) {
   return guarded(scene, __func__, [&] {
     require_argument(scene, "scene");
@@ -68,4 +70,13 @@ maq_status maq_scene_get_info(const maq_scene* scene, maq_scene_info* info) {
   });
 }
 
-void maq_scene_close(maq_scene* scene) { destroy(scene, "scene", __func__); }
+maq_status maq_scene_get_build_stats(const maq_scene* scene, maq_scene_build_stats* stats) {
+  return guarded(scene, __func__, [&] {
+    require_argument(scene, "scene");
+    if (!scene->build_stats) {
+      throw Error(MAQ_ERROR_NOT_FOUND, "The scene was opened from a file, which has no stats of its build.");
+    }
+    write_struct(stats, "stats", *scene->build_stats);
+    return MAQ_OK;
+  });
+}

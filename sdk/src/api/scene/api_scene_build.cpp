@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <optional>
 
@@ -14,9 +13,9 @@ using namespace maq;
 
 namespace {
 
-// A config that was checked.
+// A checked config.
 struct BuildSettings {
-  std::function<Bundle()> read_bundle;
+  SessionSettings session;
   SceneBuildOptions options;
   BuildProgress progress;
 };
@@ -24,35 +23,46 @@ struct BuildSettings {
 maq_scene_build_config default_scene_build_config() {
   maq_scene_build_config config{};
   config.struct_size = sizeof config;
-  config.long_side_px = 640;
-  config.coefficient_bits = 8;
-  config.min_variation = -1;
-  config.visibility_scale = 1;
   return config;
+}
+
+CoefficientFormat coefficient_format(int32_t bits) {
+  switch (bits) {
+    case 0:
+    case 8: return CoefficientFormat::kInt8;
+    case 16: return CoefficientFormat::kInt16;
+    case 32: return CoefficientFormat::kFloat32;
+    default: throw ArgumentError("config.coefficient_bits is ", bits, ", but must be 8, 16 or 32, or 0 for 8.");
+  }
+}
+
+// Nothing for the default.
+std::optional<float> min_view_dependence(double variation) {
+  if (variation == 0) return std::nullopt;
+  if (variation == MAQ_SCENE_VARIATION_ALL) return 0.0f;
+  if (!(variation > 0)) {
+    throw ArgumentError("config.min_variation is ", variation,
+                        ", but must be positive, 0 for the default, or MAQ_SCENE_VARIATION_ALL.");
+  }
+  // Colours are 0 to 1; a larger value would not fit into a float.
+  constexpr double kMaxVariation = 1e30;
+  return float(std::min(variation, kMaxVariation));
 }
 
 BuildSettings checked_settings(const maq_scene_build_config& config) {
   BuildSettings settings;
-  settings.read_bundle = bundle_reader(config, "config", kSceneBundle);
+  settings.session = scene_session_settings(config.model);
   SceneBuildOptions& options = settings.options;
-  require_range("config.long_side_px", config.long_side_px, 0, MAQ_MAX_SIDE_PX);
-  options.long_side_px = config.long_side_px;
-  CoefficientFormat format = CoefficientFormat::kInt8;
-  switch (config.coefficient_bits) {
-    case 8: break;
-    case 16: format = CoefficientFormat::kInt16; break;
-    case 32: format = CoefficientFormat::kFloat32; break;
-    default: throw ArgumentError("config.coefficient_bits is ", config.coefficient_bits, ", but must be 8, 16 or 32.");
+  if (config.long_side_px == MAQ_SCENE_LONG_SIDE_FULL) {
+    options.long_side_px = 0;
+  } else if (config.long_side_px != 0) {
+    require_range("config.long_side_px", config.long_side_px, 1, MAQ_MAX_SIDE_PX);
+    options.long_side_px = config.long_side_px;
   }
-  if (std::isnan(config.min_variation)) throw ArgumentError("config.min_variation is not a number.");
-  std::optional<float> min_view_dependence;
-  // Colours are 0 to 1, and what is over this would not fit into a float.
-  constexpr double kMaxVariation = 1e30;
-  if (config.min_variation >= 0) min_view_dependence = float(std::min(config.min_variation, kMaxVariation));
-  options.packing = packing_of(format, min_view_dependence);
-  options.fitting.visibility_scale = config.visibility_scale;
+  options.packing = packing_of(coefficient_format(config.coefficient_bits), min_view_dependence(config.min_variation));
+  if (config.visibility_scale != 0) options.fitting.visibility_scale = config.visibility_scale;
   options.fitting.near = config.near_depth;
-  options.fitting.threads = scene_threads(config.threads);
+  options.fitting.threads = settings.session.threads;
   if (config.max_memory_bytes != 0) options.fitting.max_bytes = config.max_memory_bytes;
   options.max_points = config.max_points;
   options.max_views = config.max_views;
@@ -60,8 +70,8 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   options.uses_held_out = config.use_held_out == 1;
   if (config.progress_callback != nullptr) {
     settings.progress = [callback = config.progress_callback, user_data = config.progress_user_data](
-                            double done, const std::string& what) {
-      return callback(user_data, done, what.c_str()) != 0;
+                            double done, const std::string& stage) {
+      return callback(user_data, done, stage.c_str()) != 0;
     };
   }
   return settings;
@@ -83,7 +93,7 @@ maq_scene_build_stats stats_of(const SceneBuildStats& from) {
   return stats;
 }
 
-// Unchanged where it has no length, which the builder refuses.
+// Unchanged if it has no length; the builder refuses it then.
 std::array<double, 3> unit_vector(const double (&vector)[3]) {
   const double length = std::hypot(vector[0], vector[1], vector[2]);
   std::array<double, 3> unit = {vector[0], vector[1], vector[2]};
@@ -108,20 +118,18 @@ maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t 
 }
 
 maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* given, const maq_capture* capture,
-                           maq_scene_build_stats* stats, maq_scene** scene) {
+                           maq_scene** scene) {
   return guarded(context, __func__, [&] {
     require_argument(context, "context");
     require_argument(capture, "capture");
     require_argument(scene, "scene");
     const maq_scene_build_config config = read_config(given, "config", default_scene_build_config());
     const BuildSettings settings = checked_settings(config);
-    if (stats != nullptr) require_struct_size("stats", stats->struct_size, sizeof *stats);
-    const auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
+    const auto networks = open_scene_networks(context, read_bundle_argument(config.model, "config.model", kSceneBundle),
+                                              settings.session);
     std::optional<BuiltScene> built = build_scene(capture->capture, networks, settings.options, settings.progress);
-    if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback ended the building.");
-    auto made = std::make_unique<maq_scene>(std::move(built->scene));
-    if (stats != nullptr) write_struct(stats, "stats", stats_of(built->stats));
-    *scene = made.release();
+    if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback cancelled the build.");
+    *scene = new maq_scene(std::move(built->scene), stats_of(built->stats));
     return MAQ_OK;
   });
 }
@@ -140,7 +148,8 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     }
     const maq_scene_build_config config = read_config(given, "config", default_scene_build_config());
     BuildSettings settings = checked_settings(config);
-    auto networks = open_scene_networks(context, settings.read_bundle(), settings.options.fitting.threads, true);
+    auto networks = open_scene_networks(context, read_bundle_argument(config.model, "config.model", kSceneBundle),
+                                        settings.session);
     PointCloud points;
     std::copy_n(cloud->origin, 3, points.origin.begin());
     points.reserve(cloud->point_count, false);
@@ -167,7 +176,7 @@ maq_status maq_scene_builder_add_view(maq_scene_builder* builder, const maq_fram
     check_distortion(camera->intrinsics);
     const std::optional<size_t> seen = builder->builder.add_view(photo->frame.image, lens_of(camera->intrinsics),
                                                                  pinhole_of(*camera), builder->progress);
-    if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the app cancelled it.");
+    if (!seen) return keep_error(builder, MAQ_CANCELLED, nullptr, "The photo was not added: the call was cancelled.");
     if (seen_point_count != nullptr) *seen_point_count = *seen;
     return MAQ_OK;
   });
@@ -191,7 +200,8 @@ maq_status maq_scene_builder_get_stats(const maq_scene_builder* builder, maq_sce
 maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scene** scene) {
   return guarded_alone(builder, "builder", __func__, [&] {
     require_argument(scene, "scene");
-    *scene = new maq_scene(builder->builder.finish());
+    Scene made = builder->builder.finish();
+    *scene = new maq_scene(std::move(made), stats_of(builder->builder.stats()));
     return MAQ_OK;
   });
 }

@@ -1,4 +1,4 @@
-// Structs of the C API for scenes as the SDK has them, and back.
+// Converts structs of the C API for scenes to those of the engine.
 #pragma once
 
 #include <algorithm>
@@ -10,6 +10,7 @@
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
 #include "api/camera_argument.h"
+#include "api/model_options.h"
 #include "api/scene/scene_handles.h"
 #include "core/worker_threads.h"
 #include "image/geometry/lens.h"
@@ -18,21 +19,23 @@
 
 namespace maq {
 
-inline int scene_threads(int32_t wanted) {
-  require_range("config.threads", wanted, 0, kMaxThreads);
-  return wanted > 0 ? wanted : default_threads();
-}
-
-// The bundle that a config without one means.
+// The bundle of configs that name none.
 inline constexpr char kSceneBundle[] = "scenes-int8";
 
-inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, Bundle bundle, int threads, bool spin,
-                                                          maq_provider provider = MAQ_PROVIDER_CPU) {
+// Throws ArgumentError for options out of range.
+inline SessionSettings scene_session_settings(const maq_model_options& model) {
+  require_model_options("config.model", model, ThreadMeasuring::kUnsupported);
   SessionSettings settings;
-  settings.threads = threads;
-  settings.spin = spin;
+  settings.threads = model.threads > 0 ? model.threads : default_threads();
+  settings.spin = may_spin(model);
+  settings.provider = model.provider;
+  return settings;
+}
+
+inline std::shared_ptr<SceneNetworks> open_scene_networks(maq_context* context, Bundle bundle,
+                                                          SessionSettings settings) {
   const auto runtime = context->state->onnxruntime();
-  settings.provider = available_provider(*runtime, provider);
+  settings.provider = available_provider(*runtime, settings.provider);
   return std::make_shared<SceneNetworks>(runtime, std::move(bundle), settings);
 }
 
@@ -44,7 +47,7 @@ inline void check_distortion(const maq_intrinsics& given) {
   }
 }
 
-// With the distortion.
+// The lens with its distortion.
 inline Lens lens_of(const maq_intrinsics& given) {
   Lens lens;
   lens.intrinsics() = intrinsics_of(given);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -7,7 +8,6 @@
 #include "maquette/scene.h"
 #include "scene/capture/capture.h"
 #include "scene/format/scene.h"
-#include "scene/render/scene_renderer.h"
 
 struct maq_capture : maq::HandleOf<maq::HandleKind::kCapture> {
   explicit maq_capture(maq::Capture opened) : capture(std::move(opened)) {}
@@ -16,11 +16,8 @@ struct maq_capture : maq::HandleOf<maq::HandleKind::kCapture> {
 };
 
 struct maq_scene : maq::HandleOf<maq::HandleKind::kScene> {
-  explicit maq_scene(maq::Scene made) : scene(std::move(made)) {}
+  explicit maq_scene(maq::Scene made, const std::optional<maq_scene_build_stats>& stats = {})
+      : scene(std::move(made)), build_stats(stats) {}
   maq::Scene scene;
-};
-
-struct maq_scene_image : maq::HandleOf<maq::HandleKind::kSceneImage> {
-  maq::RenderedImage image;
-  maq::BoundedPool<maq_scene_image>::Deleter deleter;
+  std::optional<maq_scene_build_stats> build_stats;  // nothing for scenes from files
 };

@@ -14,7 +14,7 @@
 
 namespace maq::head {
 
-// The face on the template head, which the encoder looks at a second time, closer.
+// The face on the template head, which the encoder reads in a second pass, closer.
 struct FaceSpec {
   Vec3 center_dm;
   double radius_dm = 0;
@@ -27,7 +27,7 @@ struct FaceSpec {
 struct EncoderSpec {
   CellGrid cells;
   double crop_sides = 1.6;       // side of the crop by the longer side of the head's box, hair included
-  std::optional<FaceSpec> face;  // none: there is no closer look
+  std::optional<FaceSpec> face;  // none: there is no second pass
 
   int crop_px() const { return cells.side * cells.cell_px; }
 };

@@ -33,11 +33,11 @@ struct StoredShape {
 // of each personal surface layer likewise, for colour codes.
 // anchors: float32 template points [anchors][3], mean [anchors][3]; float16 linear [anchors][3][shape codes];
 // float32 sigma [anchors].
-// places: of each u8 length of its name, the name, float32 template point [3].
+// landmarks: of each u8 length of its name, the name, float32 template point [3].
 struct PriorFileHead {
   FileStart start;
   StoredShape shape;
-  uint32_t shape_codes, colour_codes, anchors, places;
+  uint32_t shape_codes, colour_codes, anchors, landmarks;
   StoredFormat constant_format, bases_format;
   uint8_t zero[2];
   float sharpness, cut_point[3], cut_normal[3], bounds_min[3], bounds_max[3];
@@ -49,12 +49,12 @@ static_assert(sizeof(PriorFileHead) == 144 && offsetof(PriorFileHead, sharpness)
 // codes: float32 shape codes, colour codes; where has_code_factor is 1, float16 [K (K + 1) / 2] of K shape codes.
 // cameras: StoredCamera.
 // anchors: float16 template points [anchors][3], points [anchors][3], sigma [anchors].
-// places: as of a prior.
+// landmarks: as of a prior.
 // texture, where has_texture is 1: u32 pixels a side, u32 bytes, a JPEG file.
 struct HeadFileHead {
   FileStart start;
   StoredShape shape;
-  uint32_t shape_codes, colour_codes, cameras, anchors, places;
+  uint32_t shape_codes, colour_codes, cameras, anchors, landmarks;
   float sharpness;
   uint8_t scale_source, has_texture, has_code_factor, zero;  // has_code_factor: 0 in files of version 1
   double metres_per_unit, metres_sigma, cut_point[3], cut_normal[3];

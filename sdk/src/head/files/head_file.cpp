@@ -56,9 +56,9 @@ HeadCamera camera_of(const StoredCamera& stored) {
 // Throws unless what the head claims is what the file has room for.
 void check_counts(const HeadFileHead& head, const FieldShape& shape, const StoredBytes& file) {
   if (head.shape_codes > uint32_t(kMaxFieldCodes) || head.colour_codes > uint32_t(kMaxFieldCodes) ||
-      head.cameras > kMaxStoredCameras || head.anchors > kMaxHeadAnchors || head.places > kMaxNamedPoints) {
+      head.cameras > kMaxStoredCameras || head.anchors > kMaxHeadAnchors || head.landmarks > kMaxNamedPoints) {
     file.fail(" claims ", head.shape_codes, " and ", head.colour_codes, " codes, ", head.cameras, " cameras, ",
-              head.anchors, " anchors and ", head.places, " places: more than a head may have.");
+              head.anchors, " anchors and ", head.landmarks, " landmarks: more than a head may have.");
   }
   const uint32_t version = head.start.version;
   if (head.zero > 0 || head.has_texture > 1 || head.has_code_factor > version - kFirstHeadFileVersion) {
@@ -88,7 +88,7 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
   file_head.colour_codes = uint32_t(head.codes.colour.size());
   file_head.cameras = uint32_t(head.cameras.size());
   file_head.anchors = uint32_t(head.anchors.count());
-  file_head.places = uint32_t(head.places.size());
+  file_head.landmarks = uint32_t(head.landmarks.size());
   file_head.sharpness = head.sharpness;
   file_head.scale_source = uint8_t(head.scale.source);
   file_head.has_texture = head.texture.side_px > 0 ? 1 : 0;
@@ -112,10 +112,10 @@ std::vector<uint8_t> head_file_bytes(const StoredHead& head) {
   for (const auto* values : {&head.anchors.template_points, &head.anchors.points, &head.anchors.sigma}) {
     writer.floats(kStoredHalf, values->data(), values->size());
   }
-  for (const NamedPoint& place : head.places) {
-    writer.number(uint8_t(place.name.size()));
-    writer.text(place.name);
-    writer.floats(kStoredFloat, place.template_point.data(), 3);
+  for (const NamedPoint& landmark : head.landmarks) {
+    writer.number(uint8_t(landmark.name.size()));
+    writer.text(landmark.name);
+    writer.floats(kStoredFloat, landmark.template_point.data(), 3);
   }
   if (file_head.has_texture != 0) {
     writer.number(uint32_t(head.texture.side_px));
@@ -154,7 +154,7 @@ StoredHead read_head(const void* bytes, size_t count, const std::string& name) {
   head.anchors.template_points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));
   head.anchors.points = file.floats(kStoredHalf, 3 * size_t(file_head.anchors));
   head.anchors.sigma = file.floats(kStoredHalf, file_head.anchors);
-  head.places = file.places(file_head.places);
+  head.landmarks = file.landmarks(file_head.landmarks);
   if (file_head.has_texture != 0) {
     const auto side_px = file.number<uint32_t>(), bytes_of_texture = file.number<uint32_t>();
     if (side_px < 1 || side_px > uint32_t(kMaxTextureSide_px) || bytes_of_texture < 1) {

@@ -23,12 +23,12 @@ void check_counts(const PriorFileHead& head, const FieldShape& shape, const Stor
     file.fail(" stores its numbers in a way that version ", kPriorFileVersion, " does not have.");
   }
   if (head.shape_codes > uint32_t(kMaxFieldCodes) || head.colour_codes > uint32_t(kMaxFieldCodes) ||
-      head.anchors > kMaxHeadAnchors || head.places > kMaxNamedPoints) {
+      head.anchors > kMaxHeadAnchors || head.landmarks > kMaxNamedPoints) {
     file.fail(" claims ", head.shape_codes, " and ", head.colour_codes, " codes, ", head.anchors, " anchors and ",
-              head.places, " places: more than a prior may have.");
+              head.landmarks, " landmarks: more than a prior may have.");
   }
-  constexpr uint64_t kMinPlaceBytes = 1 + 1 + 3 * sizeof(float);
-  uint64_t bytes = head.places * kMinPlaceBytes;
+  constexpr uint64_t kMinLandmarkBytes = 1 + 1 + 3 * sizeof(float);
+  uint64_t bytes = head.landmarks * kMinLandmarkBytes;
   bytes += head.anchors * (7 * sizeof(float) + 3 * sizeof(uint16_t) * uint64_t(head.shape_codes));
   for (int layer = 0; layer < shape.layers(); ++layer) {
     bytes += stored_layer_bytes(shape, layer, head.constant_format, 1);
@@ -72,7 +72,7 @@ HeadPrior read_prior(const void* bytes, size_t count, const std::string& name) {
   prior.anchors.mean = file.floats(StoredFormat::kFloat32, 3 * anchors);
   prior.anchors.linear = file.floats(StoredFormat::kFloat16, 3 * anchors * head.shape_codes);
   prior.anchors.sigma = file.floats(StoredFormat::kFloat32, anchors);
-  prior.places = file.places(head.places);
+  prior.landmarks = file.landmarks(head.landmarks);
   file.end();
   check_head_prior(prior);
   return prior;

@@ -26,7 +26,7 @@ uint16_t float_to_half(float value) {
   if (std::isnan(value)) return uint16_t(sign | 0x7e00);
   if (magnitude >= 65520) return uint16_t(sign | 0x7c00);
   if (magnitude == 0) return sign;
-  // In units of the last place of its power of two, or of the smallest half. A carry goes into the exponent.
+  // In units of the last digit of its power of two, or of the smallest half. A carry goes into the exponent.
   const int exponent = std::max(std::ilogb(magnitude), -14);
   const int units = int(std::nearbyint(std::ldexp(magnitude, 10 - exponent)));
   return uint16_t(sign | (((exponent + 14) << 10) + units));
@@ -75,16 +75,16 @@ void StoredBytes::layers(StoredFormat format, const std::vector<FieldLayer>& of_
   for (const FieldLayer& layer : of_codes) floats(is_int8 ? StoredFormat::kFloat16 : format, layer.bias, outputs);
 }
 
-std::vector<NamedPoint> StoredBytes::places(size_t count) {
-  std::vector<NamedPoint> places;
+std::vector<NamedPoint> StoredBytes::landmarks(size_t count) {
+  std::vector<NamedPoint> landmarks;
   for (size_t i = 0; i < count; ++i) {
-    NamedPoint place;
+    NamedPoint landmark;
     const size_t length = number<uint8_t>();
-    place.name.assign(reinterpret_cast<const char*>(take(length)), length);
-    floats(StoredFormat::kFloat32, place.template_point.data(), 3);
-    places.push_back(std::move(place));
+    landmark.name.assign(reinterpret_cast<const char*>(take(length)), length);
+    floats(StoredFormat::kFloat32, landmark.template_point.data(), 3);
+    landmarks.push_back(std::move(landmark));
   }
-  return places;
+  return landmarks;
 }
 
 FieldShape checked_shape(const StoredShape& stored, const StoredBytes& bytes) {

@@ -28,7 +28,7 @@ class StoredBytes : public CheckedBytes {
   std::vector<float> floats(StoredFormat format, size_t count);
   // The weights and biases of one layer of some heads, in order.
   void layers(StoredFormat format, const std::vector<FieldLayer>& of_codes);
-  std::vector<NamedPoint> places(size_t count);
+  std::vector<NamedPoint> landmarks(size_t count);
 };
 
 // Throws the reader's damage for what no shape has, MAQ_ERROR_UNSUPPORTED as check_field_shape() does.

@@ -62,7 +62,7 @@ HeadTemplate read_template(const void* bytes, size_t count, const std::string& n
     action.name.assign(text.begin(), text.end());
     const size_t moved = file.number<uint16_t>();
     action.points = stored_indices(file, moved);
-    action.moves = stored_steps<int16_t>(file, 3 * moved, head.move_step_dm);
+    action.deltas = stored_steps<int16_t>(file, 3 * moved, head.move_step_dm);
     made.actions.push_back(std::move(action));
   }
   file.end();

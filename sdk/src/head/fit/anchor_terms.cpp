@@ -37,7 +37,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Whether a closer look shows what the cell does, not at its border.
+// Whether the second pass shows the same as the cell, away from its border.
 bool is_covered(const HeadCell& cell, const HeadObservations& closer, double border_cells) {
   const Point at = closer.photo_to_crop({cell.x_px + 0.5, cell.y_px + 0.5});
   const double scale =
@@ -61,9 +61,9 @@ AnchorTerms::AnchorTerms(const HeadPhoto& photo, const AnchorPoints& points, con
     double pixel_sigma_px;
   };
   std::vector<Usable> usable;
-  const auto take = [&](const HeadObservations& look, const HeadObservations* closer) {
-    const double pixel_sigma_px = std::max(options.pixel_sigma * look.cell_px, 1e-3);
-    for (const HeadCell& cell : look.cells) {
+  const auto take = [&](const HeadObservations& pass, const HeadObservations* closer) {
+    const double pixel_sigma_px = std::max(options.pixel_sigma * pass.cell_px, 1e-3);
+    for (const HeadCell& cell : pass.cells) {
       if (!cell.is_usable || !(cell.matte > options.min_matte)) continue;
       if (closer != nullptr && is_covered(cell, *closer, options.face_border)) continue;
       const AnchorPoints::Place place = points.place(cell.template_point);

@@ -20,7 +20,7 @@ struct AnchorTermOptions {
   double pixel_sigma = 0.3;    // of where in its cell the encoder saw the point, in cells
   double limit = 9;            // in squared sigmas
   double max_anchor_dm = 0.5;  // cells that see a point farther than this from all anchors are left out
-  // Where there is a closer look at the face, the first look is heard only around it and in this border, in cells.
+  // If the face has a second pass, the first pass counts only around it and in this border, in cells.
   double face_border = 1;
 };
 

@@ -86,7 +86,7 @@ class Fitter {
   }
 
   void run(const HeadFitCallback& callback) {
-    look(options_.last_side_px, last_level_);
+    sample_rays(options_.last_side_px, last_level_);
     held_out_ = pointers(last_level_.held_out);
     if (held_out_.empty()) held_out_ = every(pointers(last_level_.fitted), 20);
     HeadFitStats& stats = result_.stats;
@@ -149,7 +149,7 @@ class Fitter {
     return result;
   }
 
-  void look(int side_px, FitRays& rays) const {
+  void sample_rays(int side_px, FitRays& rays) const {
     rays = {};
     FitRayOptions options;
     const double fewer = std::min(1.0, std::sqrt(double(kPixelsForAll) / double(parts_.size())));
@@ -160,7 +160,7 @@ class Fitter {
   }
 
   void begin_level(bool is_first) {
-    if (is_first) look(options_.first_side_px, first_level_);
+    if (is_first) sample_rays(options_.first_side_px, first_level_);
     level_ = is_first ? &first_level_ : &last_level_;
     order_.resize(level_->fitted.size());
     std::iota(order_.begin(), order_.end(), 0u);

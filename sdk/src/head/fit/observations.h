@@ -40,7 +40,7 @@ struct CellGrid {
 // A photo of a head, and what is known of its camera.
 struct HeadPhoto {
   HeadObservations seen;
-  std::optional<HeadObservations> face;  // a second, closer look; none where no face is seen
+  std::optional<HeadObservations> face;  // of the second pass; none if no face is seen
   int width_px = 0, height_px = 0;
   double focal_px = 0;            // the prior's median
   double log_focal_sigma = 0.35;  // of the log-normal prior, 0..3; 0: the focal length is known

@@ -12,7 +12,7 @@ namespace maq::head {
 struct MorphTarget {
   std::string name;                // letters, digits and _
   std::vector<uint32_t> vertices;  // that move, increasing
-  std::vector<float> moves;        // [vertices][3], decimetres
+  std::vector<float> deltas;       // [vertices][3], decimetres
 };
 
 // What is empty is not known. Arrays of floats and bytes are by vertex.

@@ -52,12 +52,12 @@ void check_mesh(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
   check_numbers(mesh.template_points, 3, "a template point");
   check_numbers(mesh.texture_coordinates, 2, "texture coordinates");
   for (const MorphTarget& target : mesh.morph_targets) {
-    if (target.moves.size() != 3 * target.vertices.size() ||
+    if (target.deltas.size() != 3 * target.vertices.size() ||
         std::any_of(target.vertices.begin(), target.vertices.end(), [&](uint32_t v) { return v >= count; })) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The morph target ", target.name,
                   " of the mesh moves vertices that there are not. Give moves of those that there are.");
     }
-    check_numbers(target.moves, 3, "a morph target");
+    check_numbers(target.deltas, 3, "a morph target");
   }
   if (texture.empty()) return;
   if (!is_jpeg(texture) && !is_png(texture)) {
@@ -178,15 +178,11 @@ std::string mesh_as_ply(const HeadMesh& mesh) {
   return text;
 }
 
-void require_mesh_file_name(const std::string& path) {
+void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture) {
   if (!ends_with(path, ".glb") && !ends_with(path, ".obj") && !ends_with(path, ".ply")) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The mesh cannot be written as ", path,
                 ": choose a name that ends with .glb, .obj or .ply.");
   }
-}
-
-void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture) {
-  require_mesh_file_name(path);
   check_mesh(mesh, texture);
   if (ends_with(path, ".obj")) return write_obj(mesh, path, texture);
   if (ends_with(path, ".glb")) {

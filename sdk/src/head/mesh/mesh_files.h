@@ -18,9 +18,6 @@ namespace maq::head {
 // format or without coordinates; and what AtomicFile throws.
 void write_mesh_file(const HeadMesh& mesh, const std::string& path, const std::vector<uint8_t>& texture = {});
 
-// Throws MAQ_ERROR_INVALID_ARGUMENT for another extension: before long work for such a file.
-void require_mesh_file_name(const std::string& path);
-
 // What each has written in it, of a mesh and texture that write_mesh_file() would take. `material`: the name of the
 // .mtl.
 std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t>& texture);

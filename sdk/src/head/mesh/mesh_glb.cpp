@@ -156,7 +156,7 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
   }
   std::string targets, names;
   for (const MorphTarget& target : mesh.morph_targets) {
-    const std::vector<float> moves = to_file_axes(target.moves, [](const float*) { return 0.1; });
+    const std::vector<float> moves = to_file_axes(target.deltas, [](const float*) { return 0.1; });
     const bool is_sparse = target.vertices.size() < mesh.vertex_count();
     const size_t accessor = glb.add_sparse(mesh.vertex_count(), target.vertices, moves, limits_of(moves, is_sparse));
     targets += concatenate(targets.empty() ? "" : ",", "{\"POSITION\":", accessor, '}');

@@ -174,7 +174,7 @@ void MeshRaster::project(const HeadMesh& mesh, const HeadCamera& camera, const R
         const float *const row = &rotation[3 * axis], *const n = &mesh.normals[3 * i];
         attributes.normal[axis] = row[0] * n[0] + row[1] * n[1] + row[2] * n[2];
       }
-      if (has_places) attributes.texture_place = {mesh.texture_coordinates[2 * i], mesh.texture_coordinates[2 * i + 1]};
+      if (has_places) attributes.texture_uv = {mesh.texture_coordinates[2 * i], mesh.texture_coordinates[2 * i + 1]};
       if (vertex.z < double(options.near)) continue;
       const double scale = camera.focal_px / vertex.z;
       vertex.column_px = scale * vertex.x + camera.cx_px;
@@ -273,7 +273,7 @@ void MeshRaster::draw_band(const HeadMesh& mesh, const HeadCamera& camera, const
 }
 
 void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top,
-                            int bottom, const Band& band, RasterImage& image) const {
+                            int bottom, const Band& band, RenderedImage& image) const {
   const RasterSampling& sampling = band.sampling;
   const size_t width = size_t(camera.width_px), side = size_t(sampling.per_pixel), samples_count = side * side;
   const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
@@ -286,8 +286,8 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
     if (std::min({p.z, q.z, r.z}) < double(options.near)) return 0;
     const double pixels =
         (q.column_px - p.column_px) * (r.row_px - p.row_px) - (q.row_px - p.row_px) * (r.column_px - p.column_px);
-    const std::array<float, 2>&a = attributes[0]->texture_place, &b = attributes[1]->texture_place,
-                            &c = attributes[2]->texture_place;
+    const std::array<float, 2>&a = attributes[0]->texture_uv, &b = attributes[1]->texture_uv,
+                            &c = attributes[2]->texture_uv;
     const double texels = double((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) *
                           double(texture->width_px()) * double(texture->height_px());
     return texture->level_of(std::abs(texels), std::abs(pixels));
@@ -322,8 +322,8 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
     if (texture != nullptr) {
       std::array<float, 2> place{};
       for (size_t axis = 0; axis < 2; ++axis) {
-        place[axis] = weights[0] * of_p.texture_place[axis] + weights[1] * of_q.texture_place[axis] +
-                      weights[2] * of_r.texture_place[axis];
+        place[axis] = weights[0] * of_p.texture_uv[axis] + weights[1] * of_q.texture_uv[axis] +
+                      weights[2] * of_r.texture_uv[axis];
       }
       point.colour = texture->colour(place[0], place[1], level_of({&p, &q, &r}, {&of_p, &of_q, &of_r}));
     } else {
@@ -391,7 +391,7 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
 }
 
 void MeshRaster::draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options,
-                      WorkerThreads& threads, RasterImage& image) {
+                      WorkerThreads& threads, RenderedImage& image) {
   check(camera, options);
   const size_t pixels = size_t(camera.width_px) * size_t(camera.height_px);
   image.width_px = camera.width_px, image.height_px = camera.height_px;

@@ -1,4 +1,4 @@
-// Pictures of a mesh: what a camera would see of it, under a simple light or in colours that tell its shape.
+// Images of a mesh from a camera, under a simple light or in colours that show its shape.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 #include "head/camera/head_camera.h"
 #include "head/mesh/head_mesh.h"
 #include "head/mesh/mesh_texture.h"
+#include "image/rendered_image.h"
 
 namespace maq::head {
 
@@ -37,26 +38,16 @@ struct RasterOptions {
   bool draws_front_alone = false;
 };
 
-// Row by row, without padding. Kept between uses.
-struct RasterImage {
-  int width_px = 0, height_px = 0;
-  std::vector<uint8_t> bgr;            // of the mesh, not weighed by alpha; 0 where there is no mesh
-  std::vector<uint8_t> alpha;          // 255 on the mesh, else 0; between them at smooth edges
-  std::vector<float> depth;            // along the optical axis; 0 where there is no mesh
-  std::vector<float> normals;          // x, y, z in the camera, of length 1; 0 where there is no mesh
-  std::vector<float> template_points;  // x, y, z on the template head; 0 where there is no mesh; empty without them
-};
-
 class MeshRaster {
  public:
-  // Draws both sides of each triangle: its colours, normals and template points between those of its vertices, correct
-  // in perspective, or its own normal where the mesh has none. The nearest is seen; of equally near ones the first.
-  // Triangles without an area are skipped. With smooth edges a pixel's depth, normal and template point are those of
-  // what is nearest in it. The same for any number of threads.
-  // Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE for pictures of no pixels
-  // or more than 16384 a side.
+  // Draws both sides of each triangle. Colours, normals and template points are interpolated between its vertices,
+  // correct in perspective; a mesh without normals gets those of its triangles. The nearest triangle is seen; of
+  // equally near ones the first. `image` has the mesh's colours, not weighed by alpha. Triangles without an area are
+  // skipped. With smooth edges a pixel's depth, normal and template point are those of what is nearest in it. The same
+  // for any number of threads. Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE
+  // for images of no pixels or more than 16384 a side.
   void draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads,
-            RasterImage& image);
+            RenderedImage& image);
 
  private:
   struct Vertex {
@@ -65,7 +56,7 @@ class MeshRaster {
   };
   struct Attributes {
     std::array<float, 3> normal, colour, template_point;  // normal: in the camera
-    std::array<float, 2> texture_place;
+    std::array<float, 2> texture_uv;
   };
   struct Rows {
     int16_t first, last;  // empty: the triangle is not seen
@@ -77,7 +68,7 @@ class MeshRaster {
   void draw_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
                  Band& band) const;
   void shade_band(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, int top, int bottom,
-                  const Band& band, RasterImage& image) const;
+                  const Band& band, RenderedImage& image) const;
 
   std::vector<Vertex> vertices_;
   std::vector<Attributes> attributes_;              // of each vertex

@@ -54,7 +54,7 @@ HeadPrior prior_after(const HeadPrior& prior, const StoredHead& head) {
   made.sharpness = prior.sharpness;
   made.cut = prior.cut;
   made.bounds = prior.bounds;
-  made.places = prior.places;
+  made.landmarks = prior.landmarks;
   made.anchors = prior.anchors;
   for (size_t i = 0; i < made.anchors.mean.size(); ++i) {
     const float* const linear = prior.anchors.linear.data() + i * codes;

@@ -13,24 +13,23 @@
 namespace maq::head {
 namespace {
 
-// Less is no head, or one that tells nothing: of 48 x 48 cells a head fills some 600.
+// Fewer cells are no head, or too little of one: a head fills some 600 of 48 x 48 cells.
 constexpr size_t kMinHeadCells = 40;
 constexpr double kMinMatte = 0.5;
-// What is no head, the encoder takes for one, but not for any place on it: the medians of its sigmas are 0.04 to 0.08
-// for faces, up to 0.19 for backs of heads, 0.12 to 0.5 for animals and rooms. With a box somebody knows that there is
-// a head.
+// The encoder may take another object for a head, but then its sigmas are large. Their medians are 0.04 to 0.08 for
+// faces, up to 0.19 for backs of heads, and 0.12 to 0.5 for animals and rooms. A given box means that there is a head.
 constexpr double kMaxFoundSigma_dm = 0.15, kMaxSigma_dm = 0.25;
-// Of the found cells, so many may be strays on each side of the head's box.
+// This fraction of the found cells may be strays on each side of the head's box.
 constexpr double kStrayFraction = 0.01;
-// What is smaller is no head that could be fitted.
+// Smaller heads cannot be fitted.
 constexpr float kMinFoundSide_px = 8;
 constexpr double kMinSearchedSide_px = 32;
 constexpr int kMaxSearchedSquares = 7;  // a row, and a column
-constexpr int kLooksAround = 2;         // once a head was found somewhere in a photo
-// A box that moved by less of its size is the same.
+constexpr int kPassesAround = 2;        // encoder passes once a head was found somewhere in a photo
+// A box that moved by a smaller fraction of its size is the same box.
 constexpr float kSameBox = 0.15f;
 
-// Of a camera that is not known: that of phones and of portrait lenses is 0.7 to 2 times the long side.
+// Prior of an unknown focal length: phones and portrait lenses have 0.7 to 2 times the long side.
 constexpr double kFocalOfLongSide = 1.0, kLogFocalSigma = 0.35;
 
 bool is_given(const std::array<float, 4>& box) {
@@ -64,7 +63,7 @@ void check_hints(const ImageView& photo, const PhotoHints& hints) {
 
 bool shows_head(const HeadCell& cell) { return cell.is_usable && cell.matte > kMinMatte; }
 
-// Around the cells that are chosen, one at least, without strays.
+// The box around the chosen cells, at least one, without strays.
 template <typename IsChosen>
 std::array<float, 4> box_of(const HeadObservations& seen, IsChosen is_chosen) {
   std::vector<double> x, y;
@@ -93,8 +92,8 @@ bool is_same(const std::array<float, 4>& a, const std::array<float, 4>& b) {
   return true;
 }
 
-// Where a head is looked for: in the middle, in the whole photo, then in squares of half the photo's short side that
-// overlap by half, the middle ones first.
+// The squares in which a head is searched: the middle, the whole photo, then squares of half the photo's short side
+// that overlap by half, the middle ones first.
 std::vector<HeadSquare> squares_to_search(int width_px, int height_px, double roll_rad) {
   const double width = width_px, height = height_px, short_side = std::min(width, height);
   std::vector<HeadSquare> squares;
@@ -143,7 +142,7 @@ void HeadBuilder::add_photo(const ImageView& photo, const PhotoHints& hints) {
   const size_t before = found_.size();
   try {
     cancel_.check();
-    look_at(photo, hints);
+    encode_photo(photo, hints);
     cancel_.check();  // one that comes later is of the next call
   } catch (...) {
     cancel_.reset();
@@ -169,9 +168,9 @@ void HeadBuilder::clear() {
   stats_ = {};
 }
 
-HeadBuilder::Seen HeadBuilder::look(const ImageView& photo, const HeadSquare& square) {
+HeadBuilder::EncodedCrop HeadBuilder::encode_crop(const ImageView& photo, const HeadSquare& square) {
   encoder_.run(photo, square, cancel_, encoding_);
-  Seen seen;
+  EncodedCrop seen;
   seen.square = square;
   seen.cells = read_observations(encoding_.cells.data(), encoder_.spec().cells, encoding_.crop_to_photo, photo.width_px,
                                  photo.height_px);
@@ -186,17 +185,18 @@ HeadBuilder::Seen HeadBuilder::look(const ImageView& photo, const HeadSquare& sq
   return seen;
 }
 
-std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const ImageView& photo, double roll_rad) {
+std::pair<std::array<float, 4>, HeadBuilder::EncodedCrop> HeadBuilder::find_head(const ImageView& photo,
+                                                                                 double roll_rad) {
   for (const HeadSquare& square : squares_to_search(photo.width_px, photo.height_px, roll_rad)) {
-    Seen seen = look(photo, square);
+    EncodedCrop seen = encode_crop(photo, square);
     std::array<float, 4> box{};
-    for (int looks = 0; looks < kLooksAround && seen.head_cells >= kMinHeadCells; ++looks) {
+    for (int passes = 0; passes < kPassesAround && seen.head_cells >= kMinHeadCells; ++passes) {
       const std::array<float, 4> around = box_of(seen.cells, shows_head);
       if (std::max(around[2] - around[0], around[3] - around[1]) < kMinFoundSide_px) seen.head_cells = 0;
-      if (seen.head_cells == 0 || (looks > 0 && is_same(around, box))) break;
+      if (seen.head_cells == 0 || (passes > 0 && is_same(around, box))) break;
       box = around;
-      seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), roll_rad,
-                                       encoder_.spec()));
+      seen = encode_crop(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), roll_rad,
+                                              encoder_.spec()));
     }
     if (seen.head_cells >= kMinHeadCells && seen.sigma_dm <= kMaxFoundSigma_dm) return {box, std::move(seen)};
   }
@@ -204,8 +204,8 @@ std::pair<std::array<float, 4>, HeadBuilder::Seen> HeadBuilder::find_head(const 
               " pixels. Give the box of the head, or a photo where it is larger.");
 }
 
-std::optional<HeadObservations> HeadBuilder::look_at_face(const ImageView& photo, const HeadObservations& seen,
-                                                          double roll_rad) {
+std::optional<HeadObservations> HeadBuilder::encode_face_crop(const ImageView& photo, const HeadObservations& seen,
+                                                              double roll_rad) {
   const std::optional<FaceSpec>& face = encoder_.spec().face;
   if (!face) return std::nullopt;
   const auto shows_face = [&](const HeadCell& cell) { return shows_head(cell) && face->contains(cell.template_point); };
@@ -213,15 +213,15 @@ std::optional<HeadObservations> HeadBuilder::look_at_face(const ImageView& photo
   const std::array<float, 4> box = box_of(seen, shows_face);
   const double x0 = double(box[0]), y0 = double(box[1]), x1 = double(box[2]), y1 = double(box[3]);
   const double side_px = std::max(2.0, face->crop_sides * std::max(x1 - x0, y1 - y0));
-  return look(photo, {(x0 + x1) / 2, (y0 + y1) / 2, side_px, roll_rad}).cells;
+  return encode_crop(photo, {(x0 + x1) / 2, (y0 + y1) / 2, side_px, roll_rad}).cells;
 }
 
-void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
+void HeadBuilder::encode_photo(const ImageView& photo, const PhotoHints& hints) {
   std::array<float, 4> box = hints.box_px;
-  Seen seen;
+  EncodedCrop seen;
   if (is_given(box)) {
-    seen = look(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]), hints.roll_rad,
-                                     encoder_.spec()));
+    seen = encode_crop(photo, square_around(double(box[0]), double(box[1]), double(box[2]), double(box[3]),
+                                            hints.roll_rad, encoder_.spec()));
     if (seen.head_cells < kMinHeadCells || seen.sigma_dm > kMaxSigma_dm) {
       throw Error(MAQ_ERROR_NOT_FOUND, "No head is seen in the box (", box[0], ", ", box[1], ") to (", box[2], ", ",
                   box[3], ") of the photo. Give the box of the head with its hair, and its roll where it leans.");
@@ -239,7 +239,7 @@ void HeadBuilder::look_at(const ImageView& photo, const PhotoHints& hints) {
   made.rgb_side = encoder_.spec().crop_px();
   made.rgb = encoding_.rgb;
   const double cells = double(made.seen.cells.size());
-  made.face = look_at_face(photo, made.seen, hints.roll_rad);
+  made.face = encode_face_crop(photo, made.seen, hints.roll_rad);
   if (texture_.side_px > 0) crops_.push_back(texture_crop(photo, seen.square, texture_.side_px));
   photos_.push_back(std::move(made));
   found_.push_back({box, double(seen.head_cells) / cells, false, 0, 0});
@@ -290,7 +290,7 @@ StoredHead HeadBuilder::stored_head(const FieldCodes& fitted, FieldWeights weigh
   head.bounds = prior.bounds;
   head.anchors = known_anchors(prior, head.codes.shape, covariance);
   if (earlier_) head.scale = earlier_->scale(head.scale, head.anchors);
-  head.places = prior.places;
+  head.landmarks = prior.landmarks;
   head.prior_sha256 = bundle_.prior_sha256;
   return head;
 }

@@ -1,4 +1,4 @@
-// From photos to a head: the encoder looks at each, cameras and codes are found, then fitted to the pixels.
+// From photos to a head: the encoder runs on each; cameras and codes are estimated, then fitted to the pixels.
 #pragma once
 
 #include <array>
@@ -10,28 +10,28 @@
 #include <vector>
 
 #include "core/worker_threads.h"
-#include "head/reconstruction/earlier_head.h"
-#include "head/reconstruction/head_texture.h"
 #include "head/bundle/head_bundle.h"
 #include "head/bundle/head_encoder.h"
 #include "head/fit/head_fit.h"
 #include "head/fit/observations.h"
+#include "head/reconstruction/earlier_head.h"
+#include "head/reconstruction/head_texture.h"
 #include "head/stored_head.h"
 #include "nn/session.h"
 
 namespace maq::head {
 
-// As in maq_head_photo, whose comments say what they mean.
+// The fields of maq_head_photo.
 struct PhotoHints {
   std::array<float, 4> box_px{};
   double roll_rad = 0;
   double focal_px = 0;
 };
 
-// As in maq_head_photo_info.
+// The fields of maq_head_photo_info.
 struct PhotoFound {
   std::array<float, 4> box_px{};
-  double head_fraction = 0;
+  double head_coverage = 0;
   bool is_used = false;
   double focal_px = 0, rms_px = 0;
 };
@@ -54,46 +54,47 @@ class HeadBuilder {
   // On failure nothing changes. Throws MAQ_ERROR_INVALID_ARGUMENT for hints that no photo of that size can have, and
   // for more than kMaxFitPhotos; MAQ_ERROR_NOT_FOUND where no head is seen; what HeadEncoder::run() throws.
   void add_photo(const ImageView& photo, const PhotoHints& hints);
-  // A head of the same person, to whose photos those of this builder are added; it replaces an earlier one. On failure
-  // nothing changes. Throws what EarlierHead throws.
+  // Uses a head of the same person as prior; it replaces an earlier one. On failure nothing changes. Throws the errors
+  // of EarlierHead.
   void add_head(StoredHead head);
-  // Forgets the photos, and the head that they would be added to.
+  // Forgets the photos and the prior head.
   void clear();
   size_t photo_count() const { return photos_.size(); }
   const PhotoFound& found(size_t index) const { return found_[index]; }
   const HeadBuildStats& stats() const { return stats_; }
 
-  // Gets the fraction that is done; false: no further.
+  // Gets the finished fraction; returns false to cancel.
   using Progress = std::function<bool(double done)>;
   // Throws MAQ_ERROR_INVALID_ARGUMENT without photos, MAQ_ERROR_NOT_FOUND where no photo shows a head, MAQ_CANCELLED.
   StoredHead fit(double seconds, const Progress& progress);
 
-  // Gets the head so far: that of the encoder, then every `interval_s` of a fit, which waits. An empty one: no longer.
+  // Gets the head so far: first the encoder's, then every `interval_s` of a fit, which waits. Empty: no previews.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for an interval that is not 0 to 3600 s.
   using Preview = std::function<void(StoredHead head)>;
   void set_preview(double interval_s, Preview preview);
 
-  // From any thread: ends the call that runs, or else the next.
+  // From any thread: ends the running call, or else the next one.
   void cancel() noexcept { cancel_.cancel(); }
 
-  // Of the bundle; null where it has none.
+  // The template of the bundle; null if the bundle has none.
   const std::shared_ptr<const HeadTemplate>& template_head() const { return bundle_.template_head; }
   int threads() const { return encoder_.threads(); }
   maq_provider provider() const { return encoder_.provider(); }
 
  private:
-  struct Seen {
+  struct EncodedCrop {
     HeadSquare square;
     HeadObservations cells;
-    size_t head_cells = 0;  // of which the matte says that they show the head
-    double sigma_dm = 0;    // of these, the median of the encoder's
+    size_t head_cells = 0;  // cells that show the head, by the matte
+    double sigma_dm = 0;    // median of the encoder's sigmas of these cells
   };
-  void look_at(const ImageView& photo, const PhotoHints& hints);
-  Seen look(const ImageView& photo, const HeadSquare& square);
-  // A closer look at the face, if one is seen and the bundle has it.
-  std::optional<HeadObservations> look_at_face(const ImageView& photo, const HeadObservations& seen, double roll_rad);
-  // Where the head is in a photo whose app does not know, and what is seen there. Throws MAQ_ERROR_NOT_FOUND.
-  std::pair<std::array<float, 4>, Seen> find_head(const ImageView& photo, double roll_rad);
+  void encode_photo(const ImageView& photo, const PhotoHints& hints);
+  EncodedCrop encode_crop(const ImageView& photo, const HeadSquare& square);
+  // A second encoder pass on the face, if one is visible and the bundle supports it.
+  std::optional<HeadObservations> encode_face_crop(const ImageView& photo, const HeadObservations& seen,
+                                                   double roll_rad);
+  // Detects the head in a photo without a box. Throws MAQ_ERROR_NOT_FOUND.
+  std::pair<std::array<float, 4>, EncodedCrop> find_head(const ImageView& photo, double roll_rad);
   StoredHead fit_photos(double seconds, const Progress& progress);
   StoredHead stored_head(const FieldCodes& fitted, FieldWeights weights, const AnchorFit& start,
                          const std::vector<PhotoFit>& photos) const;
@@ -106,7 +107,7 @@ class HeadBuilder {
   std::vector<HeadPhoto> photos_;
   std::vector<PhotoFound> found_;
   TextureOptions texture_;
-  std::vector<TextureCrop> crops_;  // of each photo, where heads get a texture
+  std::vector<TextureCrop> crops_;  // one a photo, if heads get a texture
   HeadBuildStats stats_;
   double preview_interval_s_ = 0;
   Preview preview_;

@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "core/error.h"
-#include "head/reconstruction/head_surface.h"
 #include "head/mesh/mesh_raster.h"
+#include "head/reconstruction/head_surface.h"
 #include "image/depth.h"
 
 namespace maq::head {
 namespace {
 
-constexpr double kMinPlaceDistance = 0.01;  // units
+constexpr double kMinLandmarkDistance = 0.01;  // units
 constexpr double kMaxAspectError = 0.01;
 constexpr double kCell_m = 0.004;    // of the mesh that depth is compared with: within 0.3 mm of the surface
 constexpr float kFacing = -0.5f;     // normals beyond: within 60 degrees of the camera
@@ -49,11 +49,11 @@ HeadScale scale_by_distance(const StoredHead& head, const std::string& from, con
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The distance between \"", from, "\" and \"", to, "\" is ", distance_m,
                 " m, but must be ", kMinKnownDistance_m, " to ", kMaxKnownDistance_m, ".");
   }
-  const HeadPlace first = find_head_place(head, from), second = find_head_place(head, to);
+  const HeadLandmark first = find_head_landmark(head, from), second = find_head_landmark(head, to);
   const double distance = length(second.point - first.point);
-  if (!(distance >= kMinPlaceDistance)) {
+  if (!(distance >= kMinLandmarkDistance)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "\"", from, "\" and \"", to,
-                "\" are the same place; name two that lie apart, such as pupil_left and pupil_right.");
+                "\" are the same landmark; name two landmarks that lie apart, such as pupil_left and pupil_right.");
   }
   const double metres = distance_m / distance;
   return {metres, metres * std::hypot(first.sigma, second.sigma) / distance, ScaleSource::kGiven};
@@ -68,7 +68,7 @@ HeadScale scale_by_depth(const StoredHead& head, size_t camera, const ImageView&
   StoredHead in_units = head;
   in_units.scale.metres_per_unit = 0.1;  // so that the mesh is in the head's own unit
   const HeadMesh mesh = head_surface(in_units, {kCell_m}, threads);
-  RasterImage drawn;
+  RenderedImage drawn;
   MeshRaster().draw(mesh, seen_by, {}, threads, drawn);
   std::vector<float> depth_m(drawn.depth.size());
   depth_in_metres(depth, depth_m.data());

@@ -12,9 +12,9 @@ namespace maq::head {
 
 inline constexpr double kMinKnownDistance_m = 1e-3, kMaxKnownDistance_m = 10;
 
-// That by which the two places are `distance_m` apart. Its sigma is what the places' sigmas leave of their distance.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for a distance out of range, and places that are the same or lie within a hundredth
-// of a unit; MAQ_ERROR_NOT_FOUND for a name that the head does not have.
+// That by which the two landmarks are `distance_m` apart. Its sigma is what the landmarks' sigmas leave of their
+// distance. Throws MAQ_ERROR_INVALID_ARGUMENT for a distance out of range, and landmarks that are the same or lie
+// within a hundredth of a unit; MAQ_ERROR_NOT_FOUND for a name that the head does not have.
 HeadScale scale_by_distance(const StoredHead& head, const std::string& from, const std::string& to, double distance_m);
 
 // That by which the head lies where `depth` (DEPTH16 or DEPTH32F) sees it: an image of any size of what the camera at

@@ -16,7 +16,7 @@ namespace maq::head {
 namespace {
 
 constexpr size_t kVerticesOfTask = 1024;
-constexpr size_t kAnchorsOfPlace = 4;  // as in the fit
+constexpr size_t kAnchorsOfLandmark = 4;  // as in the fit
 
 // The field of one head together with its cut, for several threads at once.
 class CutField {
@@ -82,9 +82,9 @@ class CutField {
   mutable size_t made_ = 0;
 };
 
-std::string names_of(const std::vector<NamedPoint>& places) {
+std::string names_of(const std::vector<NamedPoint>& landmarks) {
   std::string names;
-  for (const NamedPoint& place : places) names += (names.empty() ? "" : ", ") + place.name;
+  for (const NamedPoint& landmark : landmarks) names += (names.empty() ? "" : ", ") + landmark.name;
   return names.empty() ? "none" : names;
 }
 
@@ -119,8 +119,8 @@ uint8_t byte_of_logit(float logit) {
   return share >= 0 ? uint8_t(std::lround(255 * share)) : uint8_t(0);
 }
 
-HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point) {
-  const size_t count = std::min<size_t>(kAnchorsOfPlace, anchors.count());
+HeadLandmark landmark_by_anchors(const StoredAnchors& anchors, Vec3 template_point) {
+  const size_t count = std::min<size_t>(kAnchorsOfLandmark, anchors.count());
   const auto point_of = [](const std::vector<float>& points, size_t i) {
     return Vec3{double(points[3 * i]), double(points[3 * i + 1]), double(points[3 * i + 2])};
   };
@@ -129,7 +129,7 @@ HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point) {
     nearest[i] = {length(point_of(anchors.template_points, i) - template_point), i};
   }
   std::partial_sort(nearest.begin(), nearest.begin() + std::ptrdiff_t(count), nearest.end());
-  HeadPlace place{template_point};
+  HeadLandmark landmark{template_point};
   double sum = 0;
   Vec3 offset;
   for (size_t k = 0; k < count; ++k) {
@@ -137,22 +137,23 @@ HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point) {
     const double weight = 1 / std::max(distance * distance, 1e-12);
     sum += weight;
     offset = offset + weight * (point_of(anchors.points, i) - point_of(anchors.template_points, i));
-    place.sigma += weight * double(anchors.sigma[i]);
+    landmark.sigma += weight * double(anchors.sigma[i]);
   }
-  if (count == 0) return place;
-  place.point = template_point + (1 / sum) * offset;
-  place.sigma /= sum;
-  return place;
+  if (count == 0) return landmark;
+  landmark.point = template_point + (1 / sum) * offset;
+  landmark.sigma /= sum;
+  return landmark;
 }
 
-HeadPlace find_head_place(const StoredHead& head, const std::string& name) {
-  const auto found =
-      std::find_if(head.places.begin(), head.places.end(), [&](const NamedPoint& place) { return place.name == name; });
-  if (found == head.places.end()) {
-    throw Error(MAQ_ERROR_NOT_FOUND, "The head has no place named \"", name, "\"; it has ", names_of(head.places), ".");
+HeadLandmark find_head_landmark(const StoredHead& head, const std::string& name) {
+  const auto found = std::find_if(head.landmarks.begin(), head.landmarks.end(),
+                                  [&](const NamedPoint& landmark) { return landmark.name == name; });
+  if (found == head.landmarks.end()) {
+    throw Error(MAQ_ERROR_NOT_FOUND, "The head has no landmark named \"", name, "\"; it has ", names_of(head.landmarks),
+                ".");
   }
-  return place_by_anchors(head.anchors, {double(found->template_point[0]), double(found->template_point[1]),
-                                         double(found->template_point[2])});
+  return landmark_by_anchors(head.anchors, {double(found->template_point[0]), double(found->template_point[1]),
+                                            double(found->template_point[2])});
 }
 
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,

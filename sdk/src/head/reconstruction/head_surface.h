@@ -1,4 +1,4 @@
-// The surface of a fitted head as a mesh, with normals, colours and template points; and where its named places lie.
+// The surface of a fitted head as a mesh, with normals, colours and template points; and where its landmarks lie.
 #pragma once
 
 #include <cstddef>
@@ -38,15 +38,15 @@ HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, Wor
 // Of a colour of the field; 0 where it is no number.
 uint8_t byte_of_logit(float logit);
 
-struct HeadPlace {
+struct HeadLandmark {
   Vec3 point;        // in the head's frame and unit
   double sigma = 0;  // standard deviation of each coordinate, as the anchors around it have
 };
 
 // By the anchors around a point of the template head (dm); the point itself where there are none.
-HeadPlace place_by_anchors(const StoredAnchors& anchors, Vec3 template_point);
+HeadLandmark landmark_by_anchors(const StoredAnchors& anchors, Vec3 template_point);
 
 // Throws MAQ_ERROR_NOT_FOUND for a name that the head does not have.
-HeadPlace find_head_place(const StoredHead& head, const std::string& name);
+HeadLandmark find_head_landmark(const StoredHead& head, const std::string& name);
 
 }  // namespace maq::head

@@ -34,7 +34,7 @@ struct TextureSource {
 StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
                            const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier = {});
 
-// Gives a mesh of the head (head_surface) its places in the texture.
+// Sets the texture coordinates of a mesh of the head (head_surface).
 void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh);
 
 }  // namespace maq::head

@@ -50,7 +50,7 @@ MorphTarget morph_target(const HeadTemplate& onto, const FacialAction& action, d
     if (k == 0) continue;
     made.vertices.push_back(uint32_t(vertex));
     for (size_t axis = 0; axis < 3; ++axis) {
-      made.moves.push_back(float(scale * double(action.moves[3 * (k - 1) + axis])));
+      made.deltas.push_back(float(scale * double(action.deltas[3 * (k - 1) + axis])));
     }
   }
   return made;
@@ -77,9 +77,9 @@ HeadMesh registered_template(const StoredHead& head, const HeadTemplate& onto, W
   };
   std::vector<float> starts;
   for (size_t i = 0; i < onto.points.size(); i += 3) {
-    const Vec3 point =
-        place_by_anchors(head.anchors, {double(onto.points[i]), double(onto.points[i + 1]), double(onto.points[i + 2])})
-            .point;
+    const Vec3 point = landmark_by_anchors(head.anchors, {double(onto.points[i]), double(onto.points[i + 1]),
+                                                          double(onto.points[i + 2])})
+                           .point;
     for (const double value : {point.x, point.y, point.z}) starts.push_back(float(value));
   }
   TemplateRegistration registered = register_template(onto, starts, field);

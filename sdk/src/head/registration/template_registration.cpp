@@ -52,7 +52,7 @@ class Registration {
     for (int step = 0; step < kSteps; ++step) {
       const double stiffness =
           kFirstStiffness * std::pow(kLastStiffness / kFirstStiffness, double(step) / (kSteps - 1));
-      look();
+      evaluate_field();
       std::vector<Vec3> wanted = at_;
       for (const size_t i : surface_) wanted[i] = at_[i] + own_step(i);
       relax(wanted, stiffness);
@@ -84,7 +84,7 @@ class Registration {
   }
 
   // The field at all points.
-  void look() {
+  void evaluate_field() {
     std::array<std::vector<float>, 3> axes;
     for (auto& axis : axes) axis.resize(count_);
     for (size_t i = 0; i < count_; ++i) {
@@ -156,7 +156,7 @@ class Registration {
   // Onto the surface, where it is near.
   void settle() {
     for (int step = 0; step < kLastSteps; ++step) {
-      look();
+      evaluate_field();
       for (const size_t i : surface_) {
         const double to_surface = distance(i);
         if (!is_finite(normals_[i]) || !(std::abs(to_surface) <= kMaxStep_dm)) continue;
@@ -181,7 +181,7 @@ class Registration {
   // Points that did not find their place, and those of flipped triangles, are let go of: they follow their neighbours,
   // together with the skin inside, which would hold lips and lids where it is. Where that is not enough, so do these.
   void let_go() {
-    look();
+    evaluate_field();
     std::vector<uint8_t> is_loose(count_);
     for (const size_t i : surface_) {
       is_loose[i] = !(std::abs(distance(i)) <= kLostDistance_dm) || !(length(residual(i)) <= kLostResidual_dm) ? 1 : 0;
@@ -276,7 +276,7 @@ class Registration {
   }
 
   void measure() {
-    look();
+    evaluate_field();
     result_.colours.resize(3 * count_);
     for (size_t i = 0; i < count_; ++i) {
       for (size_t c = 0; c < 3; ++c) result_.colours[3 * i + c] = values_[(7 + c) * count_ + i];

@@ -48,15 +48,15 @@ HeadRenderer::HeadRenderer(HeadMesh mesh, std::optional<MeshTexture> texture, co
   for (size_t i = 0; i < mesh_.vertex_count(); ++i) radius_ = std::max(radius_, length(vertex(mesh_, i) - middle_));
 }
 
-void HeadRenderer::render(const PinholeCamera& camera, HeadPicture& picture) {
-  check_camera(camera, "The camera of a head's picture");
+void HeadRenderer::render(const PinholeCamera& camera, RenderedImage& image) {
+  check_camera(camera, "The camera of a head's image");
   if (std::any_of(camera.centre.begin(), camera.centre.end(), [](double at) { return std::abs(at) > kFarthest_m; })) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera of a head's picture is over ", kFarthest_m, " m away.");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The camera of a head's image is over ", kFarthest_m, " m away.");
   }
   const HeadCamera of = camera_of(camera);
   RasterOptions raster;
   raster.near = float(options_.near_m);
-  raster.ambient = 1 - options_.light;
+  raster.ambient = 1 - options_.shading_strength;
   raster.shading = options_.shading;
   if (texture_) raster.texture = &*texture_;
   raster.template_reach *= kMetresPerDecimetre;
@@ -64,19 +64,19 @@ void HeadRenderer::render(const PinholeCamera& camera, HeadPicture& picture) {
   raster.pixel_aspect = camera.fy_px / camera.fx_px;
   raster.is_smooth = options_.is_smooth;
   raster.draws_front_alone = true;
-  raster_.draw(mesh_, of, raster, threads_, picture);
-  if (options_.background_rgb) lay_over_background(picture);
+  raster_.draw(mesh_, of, raster, threads_, image);
+  if (options_.background_rgb) lay_over_background(image);
 }
 
-void HeadRenderer::lay_over_background(HeadPicture& picture) {
+void HeadRenderer::lay_over_background(RenderedImage& image) {
   const std::array<uint8_t, 3>& rgb = *options_.background_rgb;
-  const size_t pixels = picture.alpha.size();
+  const size_t pixels = image.alpha.size();
   threads_.run((pixels + kPixelsOfTask - 1) / kPixelsOfTask, [&](size_t task, int) {
     for (size_t i = task * kPixelsOfTask; i < std::min(pixels, (task + 1) * kPixelsOfTask); ++i) {
-      const int alpha = picture.alpha[i];
+      const int alpha = image.alpha[i];
       if (alpha == 255) continue;
       for (size_t channel = 0; channel < 3; ++channel) {
-        uint8_t& value = picture.bgr[3 * i + channel];
+        uint8_t& value = image.bgr[3 * i + channel];
         value = uint8_t((value * alpha + rgb[2 - channel] * (255 - alpha) + 127) / 255);
       }
     }
@@ -88,7 +88,7 @@ PinholeCamera HeadRenderer::orbit_camera(double yaw_rad, double pitch_rad, int w
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The yaw is ", yaw_rad, " and the pitch ", pitch_rad,
                 ", but both must be finite, in radians.");
   }
-  check_image_size(width_px, height_px, "The picture of a head");
+  check_image_size(width_px, height_px, "The image of a head");
   PinholeCamera camera;
   camera.width_px = width_px, camera.height_px = height_px;
   camera.fx_px = camera.fy_px = 0.5 * std::min(width_px, height_px) / std::tan(kOrbitHalfView_rad);

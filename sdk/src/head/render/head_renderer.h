@@ -1,4 +1,4 @@
-// Pictures of a head from any camera.
+// Images of a head from any camera.
 #pragma once
 
 #include <array>
@@ -10,19 +10,18 @@
 #include "head/mesh/mesh_raster.h"
 #include "head/mesh/mesh_texture.h"
 #include "image/geometry/pinhole_camera.h"
+#include "image/rendered_image.h"
 
 namespace maq::head {
 
 struct HeadRenderOptions {
   int threads = 1;
-  double near_m = 0.01;   // what is nearer is not drawn
-  bool is_smooth = true;  // edges
-  float light = 0.35f;    // 0: colours as they are; 1: black where no light falls
+  double near_m = 0.01;            // nearer points are not drawn
+  bool is_smooth = true;           // edges
+  float shading_strength = 0.35f;  // 0: colours as they are; 1: black where no light falls
   MeshShading shading = MeshShading::kColour;
   std::optional<std::array<uint8_t, 3>> background_rgb;  // under the head; without it colours are not weighed by alpha
 };
-
-using HeadPicture = RasterImage;  // lengths in metres
 
 class HeadRenderer {
  public:
@@ -32,16 +31,16 @@ class HeadRenderer {
 
   void set_shading(MeshShading shading) { options_.shading = shading; }
 
-  // The world is the head's frame in metres. Throws what check_camera() throws.
-  void render(const PinholeCamera& camera, HeadPicture& picture);
+  // The world is the head's frame in metres, as are the image's lengths. Throws what check_camera() throws.
+  void render(const PinholeCamera& camera, RenderedImage& image);
 
-  // A camera that sees the whole head, whichever way it is turned, 30 degrees wide along the picture's shorter side.
+  // A camera that sees the whole head, whichever way it is turned, 30 degrees wide along the image's shorter side.
   // `yaw_rad`: how far it stands to the person's left of the front, `pitch_rad`: how far above. Throws
   // MAQ_ERROR_INVALID_ARGUMENT for angles that are not finite, and what check_image_size() throws.
   PinholeCamera orbit_camera(double yaw_rad, double pitch_rad, int width_px, int height_px) const;
 
  private:
-  void lay_over_background(HeadPicture& picture);
+  void lay_over_background(RenderedImage& image);
 
   HeadMesh mesh_;  // metres
   std::optional<MeshTexture> texture_;

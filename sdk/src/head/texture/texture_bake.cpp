@@ -140,7 +140,7 @@ void take_colours(const TextureImage& from, int side, Texels& texels) {
 
 // How much of 5 x 5 pixels around a place show a surface at this depth, or one behind it: 0 at what hides it and just
 // beside that, as a fitted edge is not quite where the photo's is.
-double seen_fraction(const RasterImage& depths, double x, double y, double depth, int spacing_px) {
+double seen_fraction(const RenderedImage& depths, double x, double y, double depth, int spacing_px) {
   int seen = 0;
   for (int j = -2; j <= 2; ++j) {
     for (int i = -2; i <= 2; ++i) {
@@ -154,10 +154,10 @@ double seen_fraction(const RasterImage& depths, double x, double y, double depth
 }
 
 // What one photo says. Its weight is a confidence, 0 to 1.
-Differences look_at(const TexturePhoto& photo, const HeadMesh& mesh, const Texels& texels, int side,
-                    WorkerThreads& threads) {
+Differences differences_of(const TexturePhoto& photo, const HeadMesh& mesh, const Texels& texels, int side,
+                           WorkerThreads& threads) {
   const HeadCamera& camera = photo.camera;
-  RasterImage depths;
+  RenderedImage depths;
   MeshRaster raster;
   raster.draw(mesh, camera, {}, threads, depths);
   const Vec3 eye = inverse(camera.head_to_camera).translation;
@@ -201,7 +201,7 @@ Differences blend(const std::vector<TexturePhoto>& photos, const HeadMesh& mesh,
   std::vector<float> shares(all.weights.size());
   double mean_of_all[3] = {}, weight_of_all = 0;
   for (const TexturePhoto& photo : photos) {
-    const Differences one = look_at(photo, mesh, texels, side, threads);
+    const Differences one = differences_of(photo, mesh, texels, side, threads);
     double sums[3] = {}, weight = 0;
     for (size_t i = 0; i < one.weights.size(); ++i) {
       weight += double(one.weights[i]);
@@ -304,7 +304,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   Differences seen = blend(photos, mesh, texels, side, threads);
   const PhotoLight light = match_light(texels, seen);
   const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
-  if (options.is_mirrored) seen = mirrored(seen, texels, side);
+  if (options.mirror_unseen) seen = mirrored(seen, texels, side);
   std::vector<float> around = seen.values;
   fill_smoothly(side, seen.weights, around);
   const std::vector<float> distances = distance_to_known(side, seen.weights);
@@ -320,7 +320,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
     for (size_t c = 0; c < 3; ++c) {
       float& colour = colours[3 * i + c];
       colour = texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * fade * around[3 * i + c];
-      if (options.is_unlit && texels.is_cap[i] == 0) {
+      if (options.delight && texels.is_cap[i] == 0) {
         colour = light[c].evened(colour, &texels.normals[3 * i], even[c]);
       }
     }

@@ -1,4 +1,4 @@
-// The picture of a head's texture: the mesh's own colours, and the photos' pixels where they see the surface well.
+// Bakes a head's texture: the photos' pixels where they see the surface well, the mesh's own colours elsewhere.
 #pragma once
 
 #include <array>
@@ -27,8 +27,8 @@ HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int s
 
 struct TextureOptions {
   int side_px = 1024;
-  bool is_mirrored = false;  // where no photo sees one side of the head, what it sees of the other
-  bool is_unlit = false;     // the light from one side is taken out: it is even, as strong as on what the photos see
+  bool mirror_unseen = false;  // a side that no photo sees gets the mirrored texture of the other side
+  bool delight = false;        // directional light is removed; the rest is as strong as on the seen surface
 };
 
 struct TextureImage {

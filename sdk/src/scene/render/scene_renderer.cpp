@@ -55,6 +55,8 @@ void set_size(RenderedImage& image, int width_px, int height_px) {
   image.bgr.resize(3 * pixels);
   image.alpha.resize(pixels);
   image.depth.resize(pixels);
+  image.normals.clear();
+  image.template_points.clear();
 }
 
 // BGR of red, green, blue in 0..1.
@@ -153,7 +155,7 @@ SceneRenderer::Frame SceneRenderer::frame_of(const PinholeCamera& camera) const 
     frame.camera.height_px = round_up(camera.height_px, DescriptorRaster::kMultiple);
   }
   if (int64_t(frame.camera.width_px) * frame.camera.height_px > SceneNetworks::kMaxPixels) {
-    throw Error(MAQ_ERROR_IMAGE_SIZE, "A picture of ", camera.width_px, " x ", camera.height_px,
+    throw Error(MAQ_ERROR_IMAGE_SIZE, "An image of ", camera.width_px, " x ", camera.height_px,
                 " pixels is rendered in a frame of ", frame.camera.width_px, " x ", frame.camera.height_px,
                 ", over the limit of ", SceneNetworks::kMaxPixels, " pixels; use a smaller one.");
   }
@@ -201,7 +203,7 @@ void SceneRenderer::rotate_back(RenderedImage& from, const PixelMap& to_frame, R
   });
 }
 
-void SceneRenderer::render(const PinholeCamera& camera, RenderedImage& image) {
+RenderCounts SceneRenderer::render(const PinholeCamera& camera, RenderedImage& image) {
   check_render_camera(camera);
   const Stopwatch whole;
   Stopwatch watch;
@@ -236,7 +238,7 @@ void SceneRenderer::render(const PinholeCamera& camera, RenderedImage& image) {
     counts.rotate_ms = watch.lap_ms();
   }
   counts.all_ms = whole.elapsed_ms();
-  image.counts = counts;
+  return counts;
 }
 
 }  // namespace maq

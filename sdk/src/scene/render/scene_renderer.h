@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/worker_threads.h"
+#include "image/rendered_image.h"
 #include "scene/gravity_alignment.h"
 #include "scene/networks/scene_networks.h"
 #include "scene/render/coverage.h"
@@ -26,7 +27,7 @@ struct RenderOptions {
   bool skips_empty_parts = true;
 };
 
-// Work and time of one picture.
+// Work and time of one image.
 struct RenderCounts {
   uint32_t blocks = 0;            // of the scene
   uint32_t projected_blocks = 0;  // of those, not culled
@@ -40,28 +41,18 @@ struct RenderCounts {
   double project_ms = 0, shade_ms = 0, reduce_ms = 0, refine_ms = 0, coverage_ms = 0, rotate_ms = 0, all_ms = 0;
 };
 
-// Planes without padding, row by row.
-struct RenderedImage {
-  int width_px = 0, height_px = 0;
-  std::vector<uint8_t> bgr;
-  std::vector<uint8_t> alpha;  // as of Coverage: 0 nothing near, 255 surely covered
-  // Depth of the nearest point, along the optical axis in units of the scene; 0 where no point is near.
-  std::vector<float> depth;
-  RenderCounts counts;
-};
-
 class SceneRenderer {
  public:
   // The networks must be those that the scene was made with, in any precision. Throws MAQ_ERROR_INVALID_ARGUMENT for
   // options out of range.
   SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options);
 
-  // Renders gravity-aligned in the smallest frame that holds the camera's picture, and rotates the result back. The
-  // same image with any number of threads. Memory of `image` is reused. Not for two threads at once, nor while another
-  // uses the networks' refiner. Throws what check_camera() and SceneNetworks::refine() throw, and
-  // MAQ_ERROR_INVALID_ARGUMENT for a camera whose principal point is over 10^6 pixels away or whose focal lengths
-  // differ by a factor over 1000.
-  void render(const PinholeCamera& camera, RenderedImage& image);
+  // Renders gravity-aligned in the smallest frame that holds the camera's image, and rotates the result back. The
+  // same image with any number of threads. Alpha is as of Coverage; depth is in units of the scene. Not for two threads
+  // at once, nor while another uses the networks' refiner. Throws what check_camera() and SceneNetworks::refine()
+  // throw, and MAQ_ERROR_INVALID_ARGUMENT for a camera whose principal point is over 10^6 pixels away or whose focal
+  // lengths differ by a factor over 1000.
+  RenderCounts render(const PinholeCamera& camera, RenderedImage& image);
 
  private:
   // The frame to render in, and how the camera's pixels map to its.

@@ -31,7 +31,7 @@ using BoxPx = std::array<float, 4>;
 struct HeadOptions {
   std::vector<std::string> photos;
   int64_t clip_frames = 8;
-  std::string add;  // a head that the photos are added to; empty: a new one
+  std::string append;  // the prior head; empty: none
   std::string out, save, preview;
   double seconds = 3;
   std::string person = "1";
@@ -39,10 +39,10 @@ struct HeadOptions {
   double roll_deg = 0;
   float focal_px = 0;
   double pupils_mm = 0;
-  std::string depth;  // a source, or "photo": what came with it
+  std::string depth;  // a source, or "photo": the depth that came with the photo
   double cell_mm = 0;
   uint32_t texture_px = 0;
-  bool is_mirrored = false, is_unlit = false;
+  bool mirror_unseen = false, delight = false;
   std::string triangles;  // empty: the library's default
   std::string topology = "field";
   std::string densepose;
@@ -83,7 +83,7 @@ struct Task {
 };
 
 struct Stages {
-  double find_ms = 0, look_ms = 0, pose_ms = 0, fit_ms = 0, mesh_ms = 0;
+  double find_ms = 0, encode_ms = 0, pose_ms = 0, fit_ms = 0, mesh_ms = 0;
 };
 
 // A frame of a clip, copied: the source needs its own frames to go on.
@@ -124,7 +124,7 @@ std::vector<Photo> read_photos(const HeadOptions& options, const maquette::Conte
       photos.push_back(copied(context, *frame, argument.uri + ", frame " + std::to_string(index), focal_px));
     }
   }
-  if (photos.empty()) throw std::runtime_error(argument.uri + " has no picture.");
+  if (photos.empty()) throw std::runtime_error(argument.uri + " has no image.");
   return photos;
 }
 
@@ -137,8 +137,7 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
 #if MAQ_HAS_DENSEPOSE
   const std::string bundle = options.densepose.empty() ? default_bundle() : options.densepose;
   if (bundle.empty()) {
-    print_error(
-        "No bundle of dense pose was found, so the head is looked for in the middle; see --densepose, --box.\n");
+    print_error("No bundle of dense pose was found, so the head is detected without it; see --densepose, --box.\n");
     return;
   }
   maq_densepose_config config = maquette::default_densepose_config();
@@ -194,12 +193,12 @@ std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>&
   return tasks;
 }
 
-using Seen = std::vector<const Photo*>;  // as the builder counts them
+using UsedPhotos = std::vector<const Photo*>;  // in the order of the builder
 
-// All photos; of a clip, those frames where the network sees a head, if it does in any.
-Seen add_photos(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
-                maquette::HeadBuilder& builder) {
-  Seen seen;
+// Adds all photos. Frames of clips without a head are left out, unless none has one.
+UsedPhotos add_photos(const HeadOptions& options, const std::vector<Photo>& photos, const Task& task,
+                      maquette::HeadBuilder& builder) {
+  UsedPhotos used;
   for (const Photo& photo : photos) {
     maq_head_photo known = maquette::default_head_photo();
     if (!photo.heads.empty()) {
@@ -210,14 +209,14 @@ Seen add_photos(const HeadOptions& options, const std::vector<Photo>& photos, co
     known.focal_px = photo.focal_px;
     try {
       builder.add_photo(photo.frame, known);
-      seen.push_back(&photo);
+      used.push_back(&photo);
     } catch (const maquette::Error& error) {
-      const bool is_last = &photo == &photos.back() && seen.empty();
+      const bool is_last = &photo == &photos.back() && used.empty();
       if (photo.is_of_clip && error.status() == MAQ_ERROR_NOT_FOUND && !is_last) continue;
       throw std::runtime_error(photo.name + ": " + error.what());
     }
   }
-  return seen;
+  return used;
 }
 
 nlohmann::ordered_json describe_photo(const Photo& photo, const maq_head_photo_info& found) {
@@ -233,18 +232,18 @@ void print_photo(const Photo& photo, const maq_head_photo_info& found) {
   const float* const box = found.box_px;
   print_output("%s  head of %.0f x %.0f px", photo.name.c_str(), double(box[2] - box[0]), double(box[3] - box[1]));
   if (found.is_used == 0) {
-    print_output("  left out: it shows no head, or another than the other photos\n");
+    print_output("  rejected: it shows no head, or a different person\n");
     return;
   }
   print_output("  focal length %.0f px (%s)  points within %.1f px\n", double(found.focal_px),
                photo.focal_px > 0 ? "given" : "estimated", double(found.rms_px));
 }
 
-void print_result(const HeadOptions& options, const Seen& photos, const Task& task,
-                  const maquette::HeadBuilder& builder, maquette::Head& head, const maq_head_mesh* mesh,
+void print_result(const HeadOptions& options, const UsedPhotos& photos, const Task& task,
+                  const maquette::HeadBuilder& builder, const maquette::Head& head, const maq_head_mesh_data* mesh,
                   const Stages& stages, const std::string& of_preview) {
   const maq_head_info info = head.info();
-  const maq_head_stats stats = builder.stats();
+  const maq_head_build_stats stats = builder.stats();
   const double pupils_m = pupil_distance_m(head);
   if (options.json) {
     nlohmann::ordered_json document = {{"person", task.person + 1}, {"photos", nlohmann::ordered_json::array()}};
@@ -265,7 +264,7 @@ void print_result(const HeadOptions& options, const Seen& photos, const Task& ta
     document["threads"] = stats.threads;
     document["provider"] = name_of(stats.provider);
     document["ms"] = {{"find", rounded_ms(stages.find_ms)},
-                      {"look", rounded_ms(stages.look_ms)},
+                      {"encode", rounded_ms(stages.encode_ms)},
                       {"pose", rounded_ms(stages.pose_ms)},
                       {"fit", rounded_ms(stages.fit_ms)},
                       {"mesh", rounded_ms(stages.mesh_ms)}};
@@ -276,8 +275,8 @@ void print_result(const HeadOptions& options, const Seen& photos, const Task& ta
   for (uint32_t i = 0; i < photos.size(); ++i) print_photo(*photos[i], builder.photo(i));
   print_output("  size %s", text_of_scale(info).c_str());
   if (pupils_m > 0) print_output("; pupils %.0f mm apart", 1e3 * pupils_m);
-  print_output("\n  find people %.0f | look %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
-               stages.find_ms, stages.look_ms, stages.pose_ms, stages.fit_ms, stats.step_count, stages.mesh_ms);
+  print_output("\n  find people %.0f | encode %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
+               stages.find_ms, stages.encode_ms, stages.pose_ms, stages.fit_ms, stats.step_count, stages.mesh_ms);
   if (mesh != nullptr) {
     print_output("%s: %u vertices, %u triangles", task.out.c_str(), mesh->vertex_count, mesh->triangle_count);
     if (mesh->simplification_error_m > 0) {
@@ -290,8 +289,8 @@ void print_result(const HeadOptions& options, const Seen& photos, const Task& ta
   print_output("%s", of_preview.c_str());
 }
 
-maq_head_mesh_options mesh_options(const HeadOptions& options) {
-  maq_head_mesh_options mesh = maquette::default_head_mesh_options();
+maq_head_mesh_config mesh_config(const HeadOptions& options) {
+  maq_head_mesh_config mesh = maquette::default_head_mesh_config();
   mesh.cell_m = options.cell_mm * 1e-3;
   mesh.topology = topology_of(options.topology);
   if (options.triangles == "all")
@@ -301,12 +300,12 @@ maq_head_mesh_options mesh_options(const HeadOptions& options) {
   return mesh;
 }
 
-// Of the size that the options tell.
+// Scales the head as the options say.
 maquette::Head sized(const HeadOptions& options, const maquette::Context& context, const Photo& first,
                      const maquette::HeadBuilder& builder, maquette::Head head) {
   if (options.pupils_mm > 0) return head.scaled_by_distance("pupil_left", "pupil_right", 1e-3 * options.pupils_mm);
   if (options.depth.empty()) return head;
-  if (builder.photo(0).is_used == 0) throw std::runtime_error("The first photo, whose depth is given, was left out.");
+  if (builder.photo(0).is_used == 0) throw std::runtime_error("The first photo, whose depth is given, was rejected.");
   if (options.depth != "photo") return head.scaled_by_depth(read_photos(options, context, options.depth).front().frame);
   if (!first.frame.depth()) {
     throw std::runtime_error(first.name +
@@ -315,45 +314,56 @@ maquette::Head sized(const HeadOptions& options, const maquette::Context& contex
   return head.scaled_by_depth(first.frame);
 }
 
-void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
-             const Task& task, maquette::HeadBuilder& builder, Stages stages) {
-  builder.clear();
-  if (!options.add.empty()) builder.add_head(maquette::Head::open(context, options.add));
-  LapTimer timer;
-  const Seen seen = add_photos(options, photos, task, builder);
-  stages.look_ms = timer.lap_ms();
-  ProgressBar progress("fitting", kHeadPermille);
-  const auto show = [&](double done) {
-    progress.advance(int64_t(done * kHeadPermille), "");
-    return !interrupted();
-  };
-  maquette::Head head(nullptr);
+// The bar of the fit that runs, for the progress callback.
+struct FitProgress {
+  ProgressBar* bar = nullptr;
+
+  static int32_t show(void* progress, double done, const char*) {
+    ProgressBar* const bar = static_cast<FitProgress*>(progress)->bar;
+    if (bar != nullptr) bar->advance(int64_t(done * kHeadPermille), "");
+    return interrupted() ? 0 : 1;
+  }
+};
+
+maquette::Head fit_head(const HeadOptions& options, maquette::HeadBuilder& builder, FitProgress& progress) {
+  ProgressBar bar("fitting", kHeadPermille);
+  progress.bar = &bar;
   try {
-    head = builder.fit(options.seconds, show);
+    maquette::Head head = builder.fit(options.seconds);
+    progress.bar = nullptr;
+    bar.finish();
+    return head;
   } catch (const maquette::Error&) {
+    progress.bar = nullptr;
     if (!interrupted()) throw;
     throw std::runtime_error("Interrupted; no file was written.");
   }
-  progress.finish();
-  head = sized(options, context, *seen.front(), builder, std::move(head));
-  const maq_head_stats stats = builder.stats();
+}
+
+void fit_one(const HeadOptions& options, const maquette::Context& context, const std::vector<Photo>& photos,
+             const Task& task, maquette::HeadBuilder& builder, FitProgress& progress, Stages stages) {
+  builder.clear();
+  if (!options.append.empty()) builder.add_head(maquette::Head::open(context, options.append));
+  LapTimer timer;
+  const UsedPhotos used = add_photos(options, photos, task, builder);
+  stages.encode_ms = timer.lap_ms();
+  const maquette::Head head = sized(options, context, *used.front(), builder, fit_head(options, builder, progress));
+  const maq_head_build_stats stats = builder.stats();
   stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
   timer.lap_ms();
-  std::optional<maq_head_mesh> mesh;
-  if (!task.out.empty()) {
-    head.export_mesh(task.out, mesh_options(options));
-    mesh = head.mesh(mesh_options(options));
-  }
+  std::optional<maquette::HeadMesh> mesh;
+  if (!task.out.empty() || !task.preview.empty()) mesh.emplace(head, mesh_config(options));
+  if (!task.out.empty()) mesh->save(task.out);
   if (!task.save.empty()) head.save(task.save);
   stages.mesh_ms = timer.lap_ms();
   std::string of_preview;
   if (!task.preview.empty()) {
     HeadView view;
-    view.mesh = mesh_options(options);
     view.threads = options.network.threads;
-    of_preview = write_head_view(context, head, task.preview, view);
+    of_preview = write_head_view(context, head, *mesh, task.preview, view);
   }
-  print_result(options, seen, task, builder, head, mesh ? &*mesh : nullptr, stages, of_preview);
+  const maq_head_mesh_data data = mesh ? mesh->data() : maq_head_mesh_data{};
+  print_result(options, used, task, builder, head, task.out.empty() ? nullptr : &data, stages, of_preview);
 }
 
 void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
@@ -367,9 +377,25 @@ void require_files(const HeadOptions& options, const std::vector<Task>& tasks) {
   if (!options.save.empty() && options.save == options.out) {
     throw std::runtime_error("--out and --save are the same file; give each a name of its own.");
   }
-  if (!options.add.empty() && options.person == "all") {
-    throw std::runtime_error("--add is one person's head; name the person, not --person all.");
+  if (!options.append.empty() && options.person == "all") {
+    throw std::runtime_error("--append takes the head of one person; name the person, not --person all.");
   }
+}
+
+// `bundle` and `progress` must outlive the configuration.
+maq_head_builder_config builder_config(const HeadOptions& options, const std::string& bundle, FitProgress& progress) {
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_path = bundle.c_str();
+  config.model.threads = options.network.threads;
+  config.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
+  config.model.provider = provider_of(options.network);
+  if (options.texture_px > 0) config.texture = MAQ_HEAD_TEXTURE_ON;
+  config.texture_px = options.texture_px;
+  config.mirror_unseen = options.mirror_unseen ? 1 : 0;
+  config.delight_texture = options.delight ? 1 : 0;
+  config.progress_callback = FitProgress::show;
+  config.progress_user_data = &progress;
+  return config;
 }
 
 int run_head(const HeadOptions& options) {
@@ -386,15 +412,8 @@ int run_head(const HeadOptions& options) {
   if (photos.size() > 1 && (options.person != "1" || !options.box.empty())) {
     throw std::runtime_error("--person and --box are for a single photo, not for a clip; see --frames.");
   }
-  maq_head_config config = maquette::default_head_config();
-  config.bundle_path = bundle.c_str();
-  config.threads = options.network.threads;
-  config.allow_spinning = options.network.no_spin ? 0 : 1;
-  config.provider = provider_of(options.network);
-  config.texture_px = options.texture_px;
-  config.texture_mirrored = options.is_mirrored ? 1 : 0;
-  config.texture_unlit = options.is_unlit ? 1 : 0;
-  maquette::HeadBuilder builder(context, config);
+  FitProgress progress;
+  maquette::HeadBuilder builder(context, builder_config(options, bundle, progress));
   Stages stages;
   LapTimer timer;
   find_heads(options, context, photos);
@@ -404,11 +423,11 @@ int run_head(const HeadOptions& options) {
   int failed = 0;
   for (const Task& task : tasks) {
     if (tasks.size() == 1) {
-      fit_one(options, context, photos, task, builder, stages);
+      fit_one(options, context, photos, task, builder, progress, stages);
       continue;
     }
     try {
-      if (!interrupted()) fit_one(options, context, photos, task, builder, stages);
+      if (!interrupted()) fit_one(options, context, photos, task, builder, progress, stages);
     } catch (const OutputLost&) {
       throw;
     } catch (const std::exception& error) {
@@ -436,110 +455,122 @@ std::string check_triangles(const std::string& text) {
   return text == "all" || triangles(text).empty() ? std::string() : text + " is neither 100 or more nor \"all\"";
 }
 
+void add_photo_options(CLI::App& command, HeadOptions& options) {
+  command.add_option("--frames", options.clip_frames, "Number of frames to use of a clip, evenly spaced (default 8)")
+      ->check(CLI::Range(int64_t(1), int64_t(64)));
+  command
+      .add_option("--person", options.person,
+                  "The person in a photo of several: 1 has the largest head (default), 2 the next; all makes one file "
+                  "each (head_1.glb, head_2.glb)")
+      ->check(CLI::Validator(check_person, "1 to 255, or all"));
+  command
+      .add_option("--box", options.box,
+                  "Box of the head with its hair, in pixels: left,top,right,bottom; people are not detected then")
+      ->delimiter(',')
+      ->expected(4);
+  command.add_option("--roll", options.roll_deg, "Rotation of the head in the photo, clockwise, degrees")
+      ->check(CLI::Range(-360.0, 360.0));
+  command
+      .add_option("--focal-px", options.focal_px,
+                  "Focal length of the camera in pixels of the photo; default: the photo's fov=, or estimated")
+      ->check(CLI::Range(1e-3f, 1e9f));
+#if MAQ_HAS_DENSEPOSE
+  command.add_option("--densepose", options.densepose,
+                     "Folder of the bundle that detects people; default: MAQ_BUNDLE, then the installed one");
+#endif
+}
+
+void add_output_options(CLI::App& command, HeadOptions& options) {
+  command.add_option("-o,--out", options.out, "Mesh to write: .glb (for most programs), .obj or .ply")
+      ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
+  command.add_option("--save", options.save, "Also write the head itself, some 64 KB: head.maqh");
+  command.add_option("--preview", options.preview, "Also write a clip of the head turning, turn.mp4, or an image")
+      ->check(CLI::Validator(check_head_view_name, ".mp4, .avi, .png or .jpg"));
+  command.add_flag("--json", options.json, "Print the result as one JSON line per head");
+}
+
+void add_fit_options(CLI::App& command, HeadOptions& options) {
+  command.add_option("--append", options.append,
+                     "Start from this head, head.maqh, of the same person; its photos are not needed again");
+  command
+      .add_option("--seconds", options.seconds,
+                  "Time for the fit to the pixels (default 3); 0: only the network's first estimate")
+      ->check(CLI::Range(0.0, 3600.0));
+  CLI::Option* const pupils = command
+                                  .add_option("--pupils", options.pupils_mm,
+                                              "Distance of the pupils in mm, as opticians measure it; scales the head")
+                                  ->check(CLI::Range(10.0, 200.0));
+  command
+      .add_option("--depth", options.depth,
+                  "Depth image of the first photo's view, 'image:depth.png?depth_unit=0.001'; or photo: the depth that "
+                  "came with it. Scales the head.")
+      ->excludes(pupils);
+}
+
+void add_mesh_options(CLI::App& command, HeadOptions& options) {
+  CLI::Option* const triangles =
+      command
+          .add_option("--triangles", options.triangles,
+                      "Number of triangles, about (default 60000, or all with --cell), or all; games and phones want "
+                      "2000 to 50000")
+          ->check(CLI::Validator(check_triangles, "100 or more, or all"));
+  CLI::Option* const cell =
+      command
+          .add_option("--cell", options.cell_mm,
+                      "Distance of the full mesh's vertices, mm (default 2.1, or 1.6 for more than 60000 triangles)")
+          ->check(CLI::Range(0.5, 20.0));
+  add_topology_option(command, options.topology)->excludes(triangles)->excludes(cell);
+  CLI::Option* const texture =
+      command
+          .add_option("--texture", options.texture_px,
+                      "Give the head a texture with the photos' pixels; pixels a side, 256 to 2048, such as 1024")
+          ->check(CLI::Range(256u, 2048u));
+  command
+      .add_flag("--mirror-unseen", options.mirror_unseen,
+                "If no photo sees one side of the head, mirror the texture of the other side")
+      ->needs(texture);
+  command
+      .add_flag("--delight", options.delight,
+                "Remove directional light of the photos from the texture, for programs that relight it")
+      ->needs(texture);
+}
+
+constexpr char kHeadFooter[] =
+    "The mesh is closed, coloured and in metres, with y up and the face to the front. It ends below the chin. A photo\n"
+    "does not tell the size of a head: it is the average size, unless --pupils or --depth tells.\n"
+    "Parts that no photo shows, such as the back of the head, follow from similar heads. More photos of the same\n"
+    "person, from the sides, help; each may have another camera. Faces should be 64 pixels or more across.\n\n"
+    "A face is biometric data: ask the person. Nothing leaves this machine. A saved head holds no photo, unless\n"
+    "--texture asks for a texture, which has the face's pixels.\n\n"
+    "Examples:\n"
+    "  maquette head photo.jpg --out head.glb\n"
+    "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
+    "  maquette head turn.mp4 --out head.glb --frames 8\n"
+    "  maquette head right.jpg --append head.maqh --out head.glb --save head.maqh\n"
+    "  maquette head group.jpg --out heads/head.ply --person all\n"
+    "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
+    "  maquette head photo.jpg --out head.glb --pupils 63\n"
+    "  maquette head photo.jpg --out head.glb --texture 1024\n"
+    "  maquette head photo.jpg --out avatar.glb --topology template\n"
+    "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
+    "  maquette head render head.maqh --out view.png --yaw 30\n"
+    "  maquette head info head.maqh";
+
 }  // namespace
 
 void add_head_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<HeadOptions>();
-  CLI::App* command =
-      app.add_subcommand("head", "Make a 3D head from one photo of a person, from several, or from a clip");
+  CLI::App* command = app.add_subcommand("head", "Make a 3D head from photos of one person, or from a clip");
   CLI::Option* const photos =
       command->add_option("photo", options->photos,
                           "Photos of one person: photo.jpg, 'image:photo.jpg?fov=60'; or a clip in which the head "
                           "turns: turn.mp4");
-  command->add_option("--frames", options->clip_frames, "Of a clip, so many frames, evenly over it (default 8)")
-      ->check(CLI::Range(int64_t(1), int64_t(64)));
-  command->add_option("-o,--out", options->out, "Mesh to write: .glb (for most programs), .obj or .ply")
-      ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
-  command->add_option("--add", options->add,
-                      "Add the photos to this head, head.maqh, whose own photos are not needed: one person");
-  command->add_option("--save", options->save, "Also keep the head itself, some 64 KB: head.maqh");
-  command
-      ->add_option("--preview", options->preview, "Also a clip of the head turning, turn.mp4; or a picture, front.png")
-      ->check(CLI::Validator(check_head_view_name, ".mp4, .avi, .png or .jpg"));
-  command
-      ->add_option("--seconds", options->seconds,
-                   "Time for the fit to the pixels (default 3); 0: only what the network sees at a glance")
-      ->check(CLI::Range(0.0, 3600.0));
-  command
-      ->add_option("--person", options->person,
-                   "Whose head, where the photo shows several: 1 has the largest head (default), 2 the next, or all "
-                   "(head_1.glb, head_2.glb)")
-      ->check(CLI::Validator(check_person, "1 to 255, or all"));
-  command
-      ->add_option("--box", options->box,
-                   "Where the head with its hair is, in pixels: left,top,right,bottom; people are not looked for then")
-      ->delimiter(',')
-      ->expected(4);
-  command->add_option("--roll", options->roll_deg, "How far the head is turned clockwise in the photo, degrees")
-      ->check(CLI::Range(-360.0, 360.0));
-  command
-      ->add_option("--focal-px", options->focal_px,
-                   "Focal length of the camera in pixels of the photo; default: estimated, or by the photo's fov=")
-      ->check(CLI::Range(1e-3f, 1e9f));
-  CLI::Option* const pupils =
-      command
-          ->add_option("--pupils", options->pupils_mm,
-                       "Distance of the person's pupils, mm, as opticians measure it; the head gets its size by it")
-          ->check(CLI::Range(10.0, 200.0));
-  command
-      ->add_option("--depth", options->depth,
-                   "Depth image of the first photo's view, 'image:depth.png?depth_unit=0.001', or photo: what came "
-                   "with it; the head gets its size by it")
-      ->excludes(pupils);
-  CLI::Option* const triangles =
-      command
-          ->add_option(
-              "--triangles", options->triangles,
-              "About how many triangles the mesh has (default 60000, or all with --cell), or all; games and phones "
-              "want 2000 to 50000")
-          ->check(CLI::Validator(check_triangles, "100 or more, or all"));
-  CLI::Option* const cell =
-      command
-          ->add_option("--cell", options->cell_mm,
-                       "Distance of the full mesh's vertices, mm (default 2.1, or 1.6 for more than 60000 triangles)")
-          ->check(CLI::Range(0.5, 20.0));
-  add_topology_option(*command, options->topology)->excludes(triangles)->excludes(cell);
-  CLI::Option* const texture =
-      command
-          ->add_option("--texture", options->texture_px,
-                       "Give the head a texture of so many pixels a side, 256 to 2048, with the photos' pixels: 1024")
-          ->check(CLI::Range(256u, 2048u));
-  command
-      ->add_flag("--mirror", options->is_mirrored,
-                 "Where the photos see one side of the head alone, let the other look like it")
-      ->needs(texture);
-  command
-      ->add_flag("--unlit", options->is_unlit,
-                 "Take the photos' light from one side out of the texture, for programs that light it anew")
-      ->needs(texture);
-#if MAQ_HAS_DENSEPOSE
-  command->add_option("--densepose", options->densepose,
-                      "Folder of the bundle that finds people; default: MAQ_BUNDLE, then the installed one");
-#endif
-  command->add_flag("--json", options->json, "Print what was found as one JSON line per head");
+  add_output_options(*command, *options);
+  add_photo_options(*command, *options);
+  add_fit_options(*command, *options);
+  add_mesh_options(*command, *options);
   add_network_options(*command, options->network, "MAQ_HEADS_BUNDLE");
-  command->footer(
-      "The mesh is closed, coloured and in metres, with y up and the face to the front, and ends below the chin. A "
-      "photo\n"
-      "does not tell how large a head is: it is taken to be of average size, unless --pupils or --depth tells.\n"
-      "What the photo does not show, the back of the head above all, is made up as heads are that look alike. More\n"
-      "photos of the same person, from the sides, help; each may be from another camera. Faces should be 64 pixels\n"
-      "or more across.\n\n"
-      "A face is biometric data: ask the person. Nothing leaves this machine, and a saved head holds no photo,\n"
-      "unless --texture asks for one, which has the face's pixels.\n\n"
-      "Examples:\n"
-      "  maquette head photo.jpg --out head.glb\n"
-      "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
-      "  maquette head turn.mp4 --out head.glb --frames 8\n"
-      "  maquette head right.jpg --add head.maqh --out head.glb --save head.maqh\n"
-      "  maquette head group.jpg --out heads/head.ply --person all\n"
-      "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
-      "  maquette head photo.jpg --out head.glb --pupils 63\n"
-      "  maquette head photo.jpg --out head.glb --texture 1024\n"
-      "  maquette head photo.jpg --out avatar.glb --topology template\n"
-      "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
-      "  maquette head render head.maqh --out view.png --yaw 30\n"
-      "  maquette head info head.maqh");
+  command->footer(kHeadFooter);
   command->require_subcommand(0, 1);
   add_head_info_command(*command, exit_code);
   add_head_render_command(*command, exit_code);

@@ -16,33 +16,32 @@ void add_head_render_command(CLI::App& head, int* exit_code);
 // "prior", "given" or "depth".
 const char* name_of_scale(maq_head_scale scale);
 
-// "as heads are on average, give or take 4 %".
+// "the average of heads, +- 4 %".
 std::string text_of_scale(const maq_head_info& info);
 
 // --topology field|template.
 CLI::Option* add_topology_option(CLI::App& command, std::string& topology);
 maq_head_topology topology_of(const std::string& name);
 
-// What a picture or a clip of a head shows.
+// The view of a head in an image or a clip.
 struct HeadView {
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;
   int width_px = 640, height_px = 480;
   double yaw_deg = 0, pitch_deg = 0;  // of the camera: to the person's left, up
-  int photo = 0;                      // by whose camera, from 1; 0: by yaw and pitch
+  int photo = 0;                      // the photo whose camera is used, from 1; 0: yaw and pitch
   double seconds = 6, fps = 25;       // of a clip, in which the head turns once
-  maq_head_mesh_options mesh = maquette::default_head_mesh_options();
   int threads = 0;
   bool with_alpha = true;                          // of a PNG; without it, as in clips, the background is seen
   std::vector<int> background_rgb = {46, 48, 54};  // 0 to 255 each
 };
 
-// An empty text where `path` can be the name of a picture or a clip of a head, else what is wrong with it.
+// Returns an empty text if `path` can be the name of an image or a clip, else the reason why not.
 std::string check_head_view_name(const std::string& path);
 
-// Writes a picture (.png, .jpg), or a clip (.mp4, .avi) in which the head turns once; makes its folder. Returns the
-// text for the user. Throws maquette::Error, std::runtime_error where the user interrupts it: an existing file stays.
-std::string write_head_view(const maquette::Context& context, maquette::Head& head, const std::string& path,
-                            const HeadView& view);
+// Writes an image (.png, .jpg), or a clip (.mp4, .avi) in which the head turns once; makes its folder. Returns the text
+// for the user. Throws maquette::Error, or std::runtime_error after an interrupt: then an existing file stays.
+std::string write_head_view(const maquette::Context& context, const maquette::Head& head,
+                            const maquette::HeadMesh& mesh, const std::string& path, const HeadView& view);
 
-// Between the pupils, in metres; 0 where the head has none.
+// Distance of the pupils in metres; 0 if the head has no pupils.
 double pupil_distance_m(const maquette::Head& head);

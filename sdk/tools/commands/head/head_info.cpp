@@ -18,18 +18,19 @@ struct HeadInfoOptions {
   bool json = false;
 };
 
-// What the template's mesh of a head has; nothing where the default bundle has no template.
+// Counts of the template's mesh; 0 if the default bundle has no template.
 struct TemplateFacts {
   uint32_t vertices = 0, triangles = 0, actions = 0;
 };
 
-TemplateFacts template_facts(maquette::Head& head, const std::string& named) {
+TemplateFacts template_facts(const maquette::Head& head, const std::string& named) {
   const std::string bundle = named.empty() ? default_heads_bundle() : named;
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
-  options.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
-  if (!bundle.empty()) options.bundle_path = bundle.c_str();
+  maq_head_mesh_config config = maquette::default_head_mesh_config();
+  config.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
+  if (!bundle.empty()) config.model.bundle_path = bundle.c_str();
   try {
-    const maq_head_mesh mesh = head.mesh(options);
+    const maquette::HeadMesh made(head, config);
+    const maq_head_mesh_data mesh = made.data();
     return {mesh.vertex_count, mesh.triangle_count, mesh.morph_target_count};
   } catch (const maquette::Error& error) {
     const bool is_missing = error.status() == MAQ_ERROR_UNSUPPORTED || error.status() == MAQ_ERROR_NOT_FOUND;
@@ -40,14 +41,14 @@ TemplateFacts template_facts(maquette::Head& head, const std::string& named) {
 
 int show_head(const HeadInfoOptions& options) {
   const maquette::Context context = open_context();
-  maquette::Head head = maquette::Head::open(context, options.path);
+  const maquette::Head head = maquette::Head::open(context, options.path);
   const maq_head_info info = head.info();
   const TemplateFacts of_template = template_facts(head, options.bundle);
   if (options.json) {
-    nlohmann::ordered_json places = nlohmann::ordered_json::object();
+    nlohmann::ordered_json landmarks = nlohmann::ordered_json::object();
     for (const std::string& name : head.landmark_names()) {
-      const maq_head_landmark place = head.landmark(name);
-      places[name] = {{"point_m", place.point_m}, {"sigma_m", place.sigma_m}};
+      const maq_head_landmark landmark = head.landmark(name);
+      landmarks[name] = {{"point_m", landmark.point_m}, {"sigma_m", landmark.sigma_m}};
     }
     print_output("%s\n", json_text({{"head", options.path},
                                     {"photos", info.photo_count},
@@ -57,7 +58,7 @@ int show_head(const HeadInfoOptions& options) {
                                      {{"vertices", of_template.vertices},
                                       {"triangles", of_template.triangles},
                                       {"facial_actions", of_template.actions}}},
-                                    {"landmarks", places}},
+                                    {"landmarks", landmarks}},
                                    2)
                              .c_str());
     return 0;
@@ -73,11 +74,12 @@ int show_head(const HeadInfoOptions& options) {
   } else {
     print_output("  template   none: the installed bundle has none, see --bundle\n");
   }
-  if (info.landmark_count > 0) print_output("  landmarks  mm to the person's left, to the back, up; give or take\n");
+  if (info.landmark_count > 0)
+    print_output("  landmarks  mm to the person's left, to the back, up; standard deviation\n");
   for (const std::string& name : head.landmark_names()) {
-    const maq_head_landmark place = head.landmark(name);
-    print_output("    %-18s %7.1f %7.1f %7.1f  %.1f\n", name.c_str(), 1e3 * place.point_m[0], 1e3 * place.point_m[1],
-                 1e3 * place.point_m[2], 1e3 * double(place.sigma_m));
+    const maq_head_landmark landmark = head.landmark(name);
+    print_output("    %-18s %7.1f %7.1f %7.1f  %.1f\n", name.c_str(), 1e3 * landmark.point_m[0],
+                 1e3 * landmark.point_m[1], 1e3 * landmark.point_m[2], 1e3 * double(landmark.sigma_m));
   }
   return 0;
 }
@@ -89,12 +91,12 @@ const char* name_of_scale(maq_head_scale scale) {
 }
 
 std::string text_of_scale(const maq_head_info& info) {
-  std::string text = info.scale == MAQ_HEAD_SCALE_GIVEN   ? "from a distance that was given"
+  std::string text = info.scale == MAQ_HEAD_SCALE_GIVEN   ? "from a given distance"
                      : info.scale == MAQ_HEAD_SCALE_DEPTH ? "from depth"
-                                                          : "as heads are on average";
+                                                          : "the average of heads";
   if (info.scale_sigma > 0) {
     char percent[32];
-    std::snprintf(percent, sizeof percent, ", give or take %.2g %%", 100 * double(info.scale_sigma));
+    std::snprintf(percent, sizeof percent, ", +- %.2g %%", 100 * double(info.scale_sigma));
     text += percent;
   }
   return text;
@@ -114,8 +116,8 @@ double pupil_distance_m(const maquette::Head& head) {
 CLI::Option* add_topology_option(CLI::App& command, std::string& topology) {
   return command
       .add_option("--topology", topology,
-                  "Of the mesh: field (default), the surface as it is, or template: the same vertices, texture "
-                  "coordinates and facial actions (morph targets) for every head")
+                  "field (default): the surface itself; template: the same vertices, texture coordinates and facial "
+                  "actions (morph targets) for every head")
       ->check(CLI::IsMember({"field", "template"}));
 }
 

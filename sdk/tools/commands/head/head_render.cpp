@@ -48,14 +48,13 @@ maq_pinhole_camera camera_of_view(const maquette::Head& head, const maquette::He
   return head.camera(uint32_t(view.photo - 1));
 }
 
-maquette::Frame frame_of_view(const maquette::Context& context, const maquette::HeadImage& image,
-                              const maq_pinhole_camera& camera) {
+maquette::Frame frame_of_view(const maquette::Context& context, const maquette::Image& image) {
   maq_frame_desc desc{};
   desc.struct_size = sizeof desc;
   desc.format = MAQ_PIXEL_BGR8;
-  desc.width_px = camera.intrinsics.width_px, desc.height_px = camera.intrinsics.height_px;
+  desc.width_px = image.width_px(), desc.height_px = image.height_px();
   desc.clock = MAQ_CLOCK_MEDIA;
-  desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_HEAD_PLANE_BGR, desc.stride_bytes));
+  desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_BGR, desc.stride_bytes));
   return maquette::Frame(context, desc);
 }
 
@@ -71,9 +70,9 @@ std::string write_turn(const maquette::Context& context, maquette::HeadRenderer&
     const maq_pinhole_camera camera =
         renderer.camera(yaw_rad, view.pitch_deg * kDegree_rad, view.width_px, view.height_px);
     const auto start = std::chrono::steady_clock::now();
-    const maquette::HeadImage image = renderer.run(camera);
+    const maquette::Image image = renderer.run(camera);
     rendering_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    clip.add(frame_of_view(context, image, camera));
+    clip.add(frame_of_view(context, image));
     progress.advance(i + 1, "");
   }
   progress.finish();
@@ -86,11 +85,13 @@ std::string write_turn(const maquette::Context& context, maquette::HeadRenderer&
 int render_head(const HeadRenderOptions& given) {
   HeadView view = given.view;
   const auto name = std::find(kShadingNames.begin(), kShadingNames.end(), given.shading);
-  view.shading = maq_head_shading(name - kShadingNames.begin() + int(MAQ_HEAD_SHADING_COLOUR));
-  view.mesh.cell_m = given.cell_mm * 1e-3;
-  view.mesh.topology = topology_of(given.topology);
+  view.shading = maq_head_shading(name - kShadingNames.begin());
+  maq_head_mesh_config mesh = maquette::default_head_mesh_config();
+  mesh.cell_m = given.cell_mm * 1e-3;
+  mesh.topology = topology_of(given.topology);
   const std::string bundle = given.bundle.empty() ? default_heads_bundle() : given.bundle;
-  if (!bundle.empty()) view.mesh.bundle_path = bundle.c_str();
+  if (!bundle.empty()) mesh.model.bundle_path = bundle.c_str();
+  mesh.model.threads = view.threads;
   view.with_alpha = !given.no_alpha;
   if (!given.size.empty()) {
     const PictureSize size = parse_picture_size(given.size);
@@ -105,8 +106,8 @@ int render_head(const HeadRenderOptions& given) {
   }
   catch_interrupts();
   const maquette::Context context = open_context();
-  maquette::Head head = maquette::Head::open(context, given.head);
-  print_output("%s", write_head_view(context, head, given.out, view).c_str());
+  const maquette::Head head = maquette::Head::open(context, given.head);
+  print_output("%s", write_head_view(context, head, maquette::HeadMesh(head, mesh), given.out, view).c_str());
   return 0;
 }
 
@@ -118,44 +119,42 @@ std::string check_head_view_name(const std::string& path) {
   return is_picture || is_clip_name(path) ? std::string() : path + " must end with .png, .jpg, .mp4 or .avi";
 }
 
-std::string write_head_view(const maquette::Context& context, maquette::Head& head, const std::string& path,
-                            const HeadView& view) {
+std::string write_head_view(const maquette::Context& context, const maquette::Head& head,
+                            const maquette::HeadMesh& mesh, const std::string& path, const HeadView& view) {
   make_folder_of(path);
   const bool with_alpha = view.with_alpha && std::filesystem::path(path).extension() == ".png";
   maq_head_renderer_config config = maquette::default_head_renderer_config();
   config.threads = view.threads;
-  config.mesh = &view.mesh;
   config.shading = view.shading;
   config.use_background = with_alpha ? 0 : 1;
   for (size_t channel = 0; channel < 3; ++channel) config.background[channel] = uint8_t(view.background_rgb[channel]);
-  maquette::HeadRenderer renderer(context, config, head);
+  maquette::HeadRenderer renderer(context, config, mesh);
   if (is_clip_name(path)) return write_turn(context, renderer, path, view);
-  renderer.run(camera_of_view(head, renderer, view)).save(path, with_alpha);
+  renderer.run(camera_of_view(head, renderer, view)).save(path, with_alpha ? MAQ_IMAGE_ALPHA_ON : MAQ_IMAGE_ALPHA_OFF);
   return path + "\n";
 }
 
 void add_head_render_command(CLI::App& head, int* exit_code) {
   auto options = std::make_shared<HeadRenderOptions>();
   HeadView& view = options->view;
-  CLI::App* command = head.add_subcommand("render", "Render a saved head: a picture, or a clip in which it turns");
+  CLI::App* command = head.add_subcommand("render", "Render a saved head: an image, or a clip in which it turns");
   command->add_option("head", options->head, "File that `maquette head --save` wrote")->required();
-  command->add_option("-o,--out", options->out, "Picture (.png, .jpg), or clip of one turn (.mp4, .avi)")
+  command->add_option("-o,--out", options->out, "Image (.png, .jpg), or clip of one turn (.mp4, .avi)")
       ->required()
       ->check(CLI::Validator(check_head_view_name, ".png, .jpg, .mp4 or .avi"));
   command
-      ->add_option("--shading", options->shading,
-                   "What the colours show: colour (default), shape, normals, template, depth")
+      ->add_option("--shading", options->shading, "Colours to show: colour (default), shape, normals, template, depth")
       ->check(CLI::IsMember(kShadingNames));
   command
       ->add_option("--yaw", view.yaw_deg,
-                   "The camera stands so far to the person's left of the front, degrees; clips begin there")
+                   "Angle of the camera to the person's left of the front, degrees; clips begin there")
       ->check(CLI::Range(-3600.0, 3600.0));
-  command->add_option("--pitch", view.pitch_deg, "The camera stands so far above, degrees")
-      ->check(CLI::Range(-90.0, 90.0));
+  command->add_option("--pitch", view.pitch_deg, "Angle of the camera above, degrees")->check(CLI::Range(-90.0, 90.0));
   command
-      ->add_option("--photo", view.photo, "As the camera of this photo saw it, from 1: lies on the head in the photo")
+      ->add_option("--photo", view.photo,
+                   "Use the camera of this photo, from 1; the image lies on the head in the photo")
       ->check(CLI::Range(1, 256));
-  command->add_option("--size", options->size, "Of the picture (default 640x480)");
+  command->add_option("--size", options->size, "Size of the image (default 640x480)");
   command->add_option("--seconds", view.seconds, "Length of a clip (default 6)")->check(CLI::Range(0.04, 600.0));
   command->add_option("--fps", view.fps, "Frames a second of a clip (default 25)")->check(CLI::Range(1.0, 240.0));
   command
@@ -163,7 +162,8 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
       ->delimiter(',')
       ->expected(3)
       ->check(CLI::Range(0, 255));
-  command->add_flag("--no-alpha", options->no_alpha, "PNG on the background; without this it is transparent there");
+  command->add_flag("--no-alpha", options->no_alpha,
+                    "Write a PNG over the background; without this option it is transparent there");
   CLI::Option* const cell =
       command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm; default: 60,000 triangles")
           ->check(CLI::Range(0.5, 20.0));

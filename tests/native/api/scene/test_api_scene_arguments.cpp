@@ -36,8 +36,8 @@ TEST_F(ApiSceneArguments, NullHandlesAreRefusedByName) {
   maq_scene_build_stats build_stats{};
   maq_scene_info info{};
   maq_scene_renderer* renderer = nullptr;
-  maq_scene_image* image = nullptr;
-  maq_scene_image_stats image_stats{};
+  maq_image* image = nullptr;
+  maq_scene_render_stats image_stats{};
   maq_capture_drop drop{};
   uint64_t count = 0;
   const void* pixels = nullptr;
@@ -47,7 +47,7 @@ TEST_F(ApiSceneArguments, NullHandlesAreRefusedByName) {
   expect_invalid(maq_capture_get_view(nullptr, 0, &view), nullptr, "maq_capture_get_view: capture is NULL");
   expect_invalid(maq_capture_get_drop(nullptr, 0, &drop), nullptr, "maq_capture_get_drop: capture");
   expect_invalid(maq_capture_load_view(nullptr, 0, &frame), nullptr, "maq_capture_load_view: capture is NULL");
-  expect_invalid(maq_scene_build(nullptr, &building_, capture_.get(), nullptr, &scene), nullptr,
+  expect_invalid(maq_scene_build(nullptr, &building_, capture_.get(), &scene), nullptr,
                  "maq_scene_build: context is NULL");
   expect_invalid(maq_scene_builder_create(nullptr, &building_, &cloud_, &builder), nullptr,
                  "maq_scene_builder_create: context is NULL");
@@ -65,9 +65,9 @@ TEST_F(ApiSceneArguments, NullHandlesAreRefusedByName) {
                  "maq_scene_renderer_create: context is NULL");
   expect_invalid(maq_scene_renderer_run(nullptr, &camera_, &image), nullptr,
                  "maq_scene_renderer_run: renderer is NULL");
-  expect_invalid(maq_scene_image_get_plane(nullptr, MAQ_SCENE_PLANE_BGR, &pixels, &stride), nullptr,
-                 "maq_scene_image_get_plane: image is NULL");
-  expect_invalid(maq_scene_image_get_stats(nullptr, &image_stats), nullptr, "maq_scene_image_get_stats: image is NULL");
+  expect_invalid(maq_image_get_plane(nullptr, MAQ_IMAGE_PLANE_BGR, &pixels, &stride), nullptr,
+                 "maq_image_get_plane: image is NULL");
+  expect_invalid(maq_image_get_scene_stats(nullptr, &image_stats), nullptr, "maq_image_get_scene_stats: image is NULL");
   EXPECT_TRUE(capture == nullptr && scene == nullptr && builder == nullptr && renderer == nullptr && image == nullptr);
 }
 
@@ -75,7 +75,7 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   maq_scene* scene = nullptr;
   maq_scene_builder* none = nullptr;
   maq_scene_renderer* no_renderer = nullptr;
-  maq_scene_image* image = nullptr;
+  maq_image* image = nullptr;
   uint64_t count = 0;
   const void* pixels = nullptr;
   size_t stride = 0;
@@ -87,8 +87,8 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   expect_invalid(maq_capture_get_view(capture, 0, nullptr), capture, "view is NULL");
   expect_invalid(maq_capture_get_drop(capture, 0, nullptr), capture, "index is 0, but there are 0");
   expect_invalid(maq_capture_load_view(capture, 0, nullptr), capture, "frame is NULL");
-  expect_invalid(maq_scene_build(context, &building_, nullptr, nullptr, &scene), context, "capture is NULL");
-  expect_invalid(maq_scene_build(context, &building_, capture, nullptr, nullptr), context, "scene is NULL");
+  expect_invalid(maq_scene_build(context, &building_, nullptr, &scene), context, "capture is NULL");
+  expect_invalid(maq_scene_build(context, &building_, capture, nullptr), context, "scene is NULL");
   expect_invalid(maq_scene_builder_create(context, &building_, nullptr, &none), context, "cloud is NULL");
   expect_invalid(maq_scene_builder_create(context, &building_, &cloud_, nullptr), context, "builder is NULL");
   expect_invalid(maq_scene_open(context, nullptr, &scene), context, "path is NULL");
@@ -110,20 +110,22 @@ TEST_F(ApiSceneArguments, NullArgumentsAreRefusedByNameWithTheHandle) {
   maquette::SceneRenderer renderer(context_, rendering_, scene_);
   expect_invalid(maq_scene_renderer_run(renderer.get(), nullptr, &image), renderer.get(), "camera is NULL");
   expect_invalid(maq_scene_renderer_run(renderer.get(), &camera_, nullptr), renderer.get(), "image is NULL");
-  const maquette::SceneImage rendered = renderer.run(camera_);
-  expect_invalid(maq_scene_image_get_plane(rendered.get(), MAQ_SCENE_PLANE_BGR, nullptr, &stride), rendered.get(),
+  const maquette::Image rendered = renderer.run(camera_);
+  expect_invalid(maq_image_get_plane(rendered.get(), MAQ_IMAGE_PLANE_BGR, nullptr, &stride), rendered.get(),
                  "pixels is NULL");
-  expect_invalid(maq_scene_image_get_plane(rendered.get(), MAQ_SCENE_PLANE_BGR, &pixels, nullptr), rendered.get(),
+  expect_invalid(maq_image_get_plane(rendered.get(), MAQ_IMAGE_PLANE_BGR, &pixels, nullptr), rendered.get(),
                  "stride_bytes is NULL");
-  expect_invalid(maq_scene_image_get_stats(rendered.get(), nullptr), rendered.get(), "stats is NULL");
-  expect_invalid(maq_scene_image_save(rendered.get(), nullptr, 0), rendered.get(), "path is NULL");
-  expect_invalid(maq_scene_image_save(rendered.get(), "f.png", 2), rendered.get(), "with_alpha is 2");
+  expect_invalid(maq_image_get_scene_stats(rendered.get(), nullptr), rendered.get(), "stats is NULL");
+  maq_image_alpha two = MAQ_IMAGE_ALPHA_OFF;
+  reinterpret_cast<int32_t&>(two) = 2;
+  expect_invalid(maq_image_save(rendered.get(), nullptr, MAQ_IMAGE_ALPHA_OFF), rendered.get(), "path is NULL");
+  expect_invalid(maq_image_save(rendered.get(), "f.png", two), rendered.get(), "alpha is 2");
 }
 
 TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
   maquette::SceneBuilder builder(context_, building_, cloud_);
   maquette::SceneRenderer renderer(context_, rendering_, scene_);
-  const maquette::SceneImage image = renderer.run(camera_);
+  const maquette::Image image = renderer.run(camera_);
   const maquette::Frame photo = capture_.load_view(0);
   for (const uint32_t wrong : {0u, 4u, 100000u, 0xFFFFFFFFu}) {
     const std::string is = ".struct_size is " + std::to_string(wrong);
@@ -138,20 +140,18 @@ TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
     building.struct_size = wrong;
     maq_scene* scene = nullptr;
     maq_scene_builder* none = nullptr;
-    expect_invalid(maq_scene_build(context_.get(), &building, capture_.get(), nullptr, &scene), context_.get(),
-                   "config" + is);
+    expect_invalid(maq_scene_build(context_.get(), &building, capture_.get(), &scene), context_.get(), "config" + is);
     expect_invalid(maq_scene_builder_create(context_.get(), &building, &cloud_, &none), context_.get(), "config" + is);
     maq_scene_build_stats build_stats{};
     build_stats.struct_size = wrong;
-    expect_invalid(maq_scene_build(context_.get(), &building_, capture_.get(), &build_stats, &scene), context_.get(),
-                   "stats" + is);
+    expect_invalid(maq_scene_get_build_stats(scene_.get(), &build_stats), scene_.get(), "stats" + is);
     expect_invalid(maq_scene_builder_get_stats(builder.get(), &build_stats), builder.get(), "stats" + is);
     maq_point_cloud cloud = cloud_;
     cloud.struct_size = wrong;
     expect_invalid(maq_scene_builder_create(context_.get(), &building_, &cloud, &none), context_.get(), "cloud" + is);
     maq_pinhole_camera camera = camera_;
     camera.struct_size = wrong;
-    maq_scene_image* no_image = nullptr;
+    maq_image* no_image = nullptr;
     expect_invalid(maq_scene_builder_add_view(builder.get(), photo.get(), &camera, nullptr), builder.get(),
                    "camera" + is);
     expect_invalid(maq_scene_renderer_run(renderer.get(), &camera, &no_image), renderer.get(), "camera" + is);
@@ -163,9 +163,9 @@ TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
     maq_scene_renderer* no_renderer = nullptr;
     expect_invalid(maq_scene_renderer_create(context_.get(), &rendering, scene_.get(), &no_renderer), context_.get(),
                    "config" + is);
-    maq_scene_image_stats image_stats{};
+    maq_scene_render_stats image_stats{};
     image_stats.struct_size = wrong;
-    expect_invalid(maq_scene_image_get_stats(image.get(), &image_stats), image.get(), "stats" + is);
+    expect_invalid(maq_image_get_scene_stats(image.get(), &image_stats), image.get(), "stats" + is);
     EXPECT_TRUE(scene == nullptr && none == nullptr && no_renderer == nullptr && no_image == nullptr);
     EXPECT_EQ(maq_scene_build_config_init(&building, wrong), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(maq_scene_renderer_config_init(&rendering, wrong), MAQ_ERROR_INVALID_ARGUMENT);
@@ -177,15 +177,10 @@ TEST_F(ApiSceneArguments, StructsOfUnknownSizeAreRefusedByName) {
 TEST_F(ApiSceneArguments, DefaultsAreThoseOfTheHeader) {
   const maq_scene_build_config building = maquette::default_scene_build_config();
   EXPECT_EQ(building.struct_size, sizeof building);
-  EXPECT_EQ(building.long_side_px, 640);
-  EXPECT_EQ(building.coefficient_bits, 8);
-  EXPECT_LT(building.min_variation, 0);
-  EXPECT_EQ(building.visibility_scale, 1);
-  EXPECT_TRUE(building.bundle_path == nullptr && building.progress_callback == nullptr);
+  EXPECT_TRUE(building.model.bundle_path == nullptr && building.progress_callback == nullptr);
   const maq_scene_renderer_config rendering = maquette::default_scene_renderer_config();
   EXPECT_EQ(rendering.struct_size, sizeof rendering);
-  EXPECT_EQ(rendering.image_pool_size, 4u);
-  EXPECT_EQ(rendering.allow_spinning, 1);
+  EXPECT_TRUE(rendering.model.bundle_path == nullptr && rendering.image_pool_size == 0);
 }
 
 TEST_F(ApiSceneArguments, WithoutAConfigTheInstalledBundleIsUsed) {
@@ -195,11 +190,11 @@ TEST_F(ApiSceneArguments, WithoutAConfigTheInstalledBundleIsUsed) {
 }
 
 TEST_F(ApiSceneArguments, DestroyingNullIsFine) {
-  maq_capture_close(nullptr);
-  maq_scene_close(nullptr);
+  maq_capture_destroy(nullptr);
+  maq_scene_destroy(nullptr);
   maq_scene_builder_destroy(nullptr);
   maq_scene_renderer_destroy(nullptr);
-  maq_scene_image_release(nullptr);
+  maq_image_release(nullptr);
 }
 
 TEST_F(ApiSceneArguments, FoldersAndPathsThatAreEmptyAreAStatus) {
@@ -207,8 +202,8 @@ TEST_F(ApiSceneArguments, FoldersAndPathsThatAreEmptyAreAStatus) {
   EXPECT_EQ(maq_capture_open(context_.get(), "", &capture), MAQ_ERROR_NOT_FOUND);
   maq_scene* scene = nullptr;
   EXPECT_EQ(maq_scene_open(context_.get(), "", &scene), MAQ_ERROR_NOT_FOUND);
-  building_.bundle_path = "";
-  EXPECT_EQ(maq_scene_build(context_.get(), &building_, capture_.get(), nullptr, &scene), MAQ_ERROR_NOT_FOUND);
+  building_.model.bundle_path = "";
+  EXPECT_EQ(maq_scene_build(context_.get(), &building_, capture_.get(), &scene), MAQ_ERROR_NOT_FOUND);
 }
 
 // Layouts that apps rely on.

@@ -52,8 +52,8 @@ TEST_F(ApiSceneBuilding, ACaptureBecomesASceneAndTellsHowItGoes) {
   maq_scene_build_config config = build_config();
   config.progress_callback = Progress::call;
   config.progress_user_data = &progress;
-  maq_scene_build_stats stats{};
-  const maquette::Scene scene(context_, config, capture, &stats);
+  const maquette::Scene scene(context_, config, capture);
+  const maq_scene_build_stats stats = scene.build_stats();
   EXPECT_EQ(stats.view_count, 4u) << "one is held out";
   EXPECT_EQ(stats.unused_view_count, 0u);
   EXPECT_EQ(stats.cloud_point_count, capture.info().point_count);
@@ -69,13 +69,12 @@ TEST_F(ApiSceneBuilding, ACaptureBecomesASceneAndTellsHowItGoes) {
   EXPECT_EQ(progress.what[0].rfind("Photo 1 of 4", 0), 0u) << progress.what[0];
 
   config.use_held_out = 1;
-  maquette::Scene(context_, config, capture, &stats);
-  EXPECT_EQ(stats.view_count, 5u);
+  EXPECT_EQ(maquette::Scene(context_, config, capture).build_stats().view_count, 5u);
   config.max_views = 2;
   config.max_points = 100;
-  const maquette::Scene small(context_, config, capture, &stats);
-  EXPECT_EQ(stats.view_count, 2u);
-  EXPECT_EQ(stats.cloud_point_count, 100u);
+  const maquette::Scene small(context_, config, capture);
+  EXPECT_EQ(small.build_stats().view_count, 2u);
+  EXPECT_EQ(small.build_stats().cloud_point_count, 100u);
   EXPECT_LE(small.info().point_count, 100u);
 }
 
@@ -91,11 +90,8 @@ TEST_F(ApiSceneBuilding, TheCallbackCancelsAtEveryCall) {
     progress.ends_at = calls;
     config.progress_user_data = &progress;
     maq_scene* scene = nullptr;
-    maq_scene_build_stats stats{};
-    stats.struct_size = sizeof stats;
-    EXPECT_EQ(maq_scene_build(context_.get(), &config, capture.get(), &stats, &scene), MAQ_CANCELLED) << calls;
+    EXPECT_EQ(maq_scene_build(context_.get(), &config, capture.get(), &scene), MAQ_CANCELLED) << calls;
     EXPECT_EQ(scene, nullptr);
-    EXPECT_EQ(stats.cloud_point_count, 0u) << "as before";
     EXPECT_EQ(progress.done.size(), calls + 1) << "it is not asked again";
   }
 }
@@ -106,7 +102,8 @@ TEST_F(ApiSceneBuilding, AnAppsOwnCloudAndPhotosGiveTheSceneOfTheCapture) {
   const std::vector<float> places = api_tiny_scene::capture_places();
   maquette::SceneBuilder builder(context_, build_config(), cloud_of(places));
   for (const uint32_t i : {0u, 1u, 2u, 4u}) builder.add_view(capture.load_view(i), capture.view(i).camera);
-  const maq_scene_info found = builder.finish().info();
+  const maquette::Scene scene = builder.finish();
+  const maq_scene_info found = scene.info();
   EXPECT_EQ(found.point_count, expected.point_count);
   EXPECT_NEAR(double(found.view_dependent_count), double(expected.view_dependent_count), 2);
   for (int axis = 0; axis < 3; ++axis) {
@@ -119,6 +116,7 @@ TEST_F(ApiSceneBuilding, AnAppsOwnCloudAndPhotosGiveTheSceneOfTheCapture) {
   EXPECT_EQ(stats.seen_point_count, found.point_count);
   EXPECT_EQ(stats.cloud_point_count, places.size() / 3);
   EXPECT_GT(stats.load_ms, 0);
+  EXPECT_EQ(scene.build_stats().seen_point_count, stats.seen_point_count);
 }
 
 TEST_F(ApiSceneBuilding, PhotosOfEveryPixelFormatSeeTheSame) {
@@ -232,12 +230,13 @@ TEST_F(ApiSceneBuilding, SettingsOutOfRangeAreRefusedByName) {
     expect_refused(cloud_of(places_), config, MAQ_ERROR_INVALID_ARGUMENT, name);
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect("config.threads", [](auto& config) { config.threads = -1; });
-  expect("config.threads", [](auto& config) { config.threads = 65; });
-  expect("config.long_side_px", [](auto& config) { config.long_side_px = -1; });
+  expect("config.model.threads", [](auto& config) { config.model.threads = -1; });
+  expect("config.model.threads", [](auto& config) { config.model.threads = 65; });
+  expect("config.long_side_px", [](auto& config) { config.long_side_px = -2; });
   expect("config.long_side_px", [](auto& config) { config.long_side_px = 16385; });
   expect("config.coefficient_bits is 9", [](auto& config) { config.coefficient_bits = 9; });
   expect("config.min_variation", [=](auto& config) { config.min_variation = nan; });
+  expect("config.min_variation is -0.5", [](auto& config) { config.min_variation = -0.5; });
   expect("visibility scale is 1.01", [](auto& config) { config.visibility_scale = 1.01; });
   expect("visibility scale", [=](auto& config) { config.visibility_scale = nan; });
   expect("nearest point", [](auto& config) { config.near_depth = -1; });
@@ -251,7 +250,7 @@ TEST_F(ApiSceneBuilding, CoefficientsAreOfTheBitsAskedForAndMayAllVaryOrNone) {
   for (const int32_t bits : {8, 16, 32}) {
     maq_scene_build_config config = build_config();
     config.coefficient_bits = bits;
-    config.min_variation = 0;
+    config.min_variation = MAQ_SCENE_VARIATION_ALL;
     const maq_scene_info all = maquette::Scene(context_, config, capture).info();
     EXPECT_EQ(all.coefficient_bits, bits);
     EXPECT_GT(all.view_dependent_count, 0u);
@@ -298,7 +297,7 @@ TEST_F(ApiSceneBuilding, CamerasAndPhotosThatDoNotFitAreRefusedAndChangeNothing)
 
 TEST_F(ApiSceneBuilding, PhotosOverTheNetworksLimitNeedALongSide) {
   maq_scene_build_config config = build_config();
-  config.long_side_px = 0;
+  config.long_side_px = MAQ_SCENE_LONG_SIDE_FULL;
   const Photo large(MAQ_PIXEL_GREY8, 4096, 2112);
   const maquette::Frame frame(context_, large.desc);
   const maq_pinhole_camera camera = camera_at(0, 4096, 2112);
@@ -325,9 +324,9 @@ TEST_F(ApiSceneBuilding, TheLimitOfMemoryIsAStatus) {
 
 TEST_F(ApiSceneBuilding, WrongNetworksAreAStatus) {
   maq_scene_build_config config = build_config();
-  config.bundle_path = "/no/such/bundle";
+  config.model.bundle_path = "/no/such/bundle";
   expect_refused(cloud_of(places_), config, MAQ_ERROR_NOT_FOUND, "/no/such/bundle");
-  config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   expect_refused(cloud_of(places_), config, MAQ_ERROR_UNSUPPORTED, "the task scenes");
   maq_context_config without = maquette::default_context_config();
   without.onnxruntime_library = "/no/such/libonnxruntime.so.1";
@@ -344,14 +343,13 @@ TEST_F(ApiSceneBuilding, CapturesOfWhichNoPhotoIsLeftAreAStatus) {
   const maquette::Capture capture(context_, folder.file("c"));
   maq_scene_build_config config = build_config();
   std::filesystem::remove(folder.file("c/images/0.png"));
-  maq_scene_build_stats stats{};
-  maquette::Scene(context_, config, capture, &stats);
+  const maq_scene_build_stats stats = maquette::Scene(context_, config, capture).build_stats();
   EXPECT_EQ(stats.view_count, 3u);
   EXPECT_EQ(stats.unused_view_count, 1u);
   for (const int i : {1, 2, 4}) write_text(folder.file("c/images/" + std::to_string(i) + ".png"), "no picture");
   maq_scene* scene = nullptr;
-  expect_error(maq_scene_build(context_.get(), &config, capture.get(), nullptr, &scene), MAQ_ERROR_UNREADABLE,
-               context_.get(), "None of the photos can be used");
+  expect_error(maq_scene_build(context_.get(), &config, capture.get(), &scene), MAQ_ERROR_UNREADABLE, context_.get(),
+               "None of the photos can be used");
   EXPECT_EQ(scene, nullptr);
 }
 
@@ -392,7 +390,7 @@ TEST_F(ApiSceneBuilding, ScenesAreBuiltSideBySideOfOneCapture) {
   for (int t = 0; t < 2; ++t) {
     threads.emplace_back([&] {
       maq_scene_build_config config = build_config();
-      config.threads = 2;
+      config.model.threads = 2;
       EXPECT_EQ(maquette::Scene(context_, config, capture).info().point_count, expected);
       EXPECT_EQ(capture.load_view(1).desc().width_px, 72);
     });
@@ -407,7 +405,7 @@ TEST_F(ApiSceneBuilding, ABuilderOutlivesWhatItWasMadeOf) {
     const maquette::Context context;
     const std::string bundle = api_tiny_scene::kBundle;
     maq_scene_build_config config = build_config();
-    config.bundle_path = bundle.c_str();
+    config.model.bundle_path = bundle.c_str();
     const std::vector<float> places = places_;
     builder = std::make_unique<maquette::SceneBuilder>(context, config, cloud_of(places));
     frame = std::make_unique<maquette::Frame>(maquette::Capture(context, kCapture).load_view(0));

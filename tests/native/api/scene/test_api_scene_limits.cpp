@@ -32,7 +32,7 @@ TEST(ApiSceneLimits, TwentyMillionPointsOfAnAppTakeLittleMoreThanACopyOfThem) {
     EXPECT_EQ(builder.stats().cloud_point_count, kPoints);
     EXPECT_LT(scene.info().point_count, 5000u);
     maquette::SceneRenderer renderer(context, renderer_config(), scene);
-    EXPECT_GT(renderer.run(camera_at(0.1)).stats().shaded_point_count, 300u);
+    EXPECT_GT(renderer.run(camera_at(0.1)).scene_stats().shaded_point_count, 300u);
   });
   RecordProperty("grown_mib", std::to_string(grown_mib));
   // 229 MiB for the copy, 76 for what is known of points that nobody saw.

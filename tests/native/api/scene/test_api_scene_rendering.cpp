@@ -17,8 +17,8 @@ using api_tiny_scene::renderer_config;
 class ApiSceneRendering : public ::testing::Test {
  protected:
   template <class T>
-  static std::vector<T> plane_of(const maquette::SceneImage& image, maq_scene_plane plane,
-                                 const maq_pinhole_camera& camera, int channels = 1) {
+  static std::vector<T> plane_of(const maquette::Image& image, maq_image_plane plane, const maq_pinhole_camera& camera,
+                                 int channels = 1) {
     size_t stride = 0;
     const auto* const rows = static_cast<const uint8_t*>(image.plane(plane, &stride));
     std::vector<T> values;
@@ -28,8 +28,8 @@ class ApiSceneRendering : public ::testing::Test {
     }
     return values;
   }
-  static std::vector<uint8_t> bgr_of(const maquette::SceneImage& image, const maq_pinhole_camera& camera) {
-    return plane_of<uint8_t>(image, MAQ_SCENE_PLANE_BGR, camera, 3);
+  static std::vector<uint8_t> bgr_of(const maquette::Image& image, const maq_pinhole_camera& camera) {
+    return plane_of<uint8_t>(image, MAQ_IMAGE_PLANE_BGR, camera, 3);
   }
 
   void expect_refused(const maq_scene_renderer_config& config, maq_status status, const std::string& text) const {
@@ -47,15 +47,20 @@ class ApiSceneRendering : public ::testing::Test {
 TEST_F(ApiSceneRendering, GivesPlanesAndStats) {
   maquette::SceneRenderer renderer(context_, renderer_config(), scene_);
   const maq_pinhole_camera camera = camera_at(0.3, 100, 80);
-  const maquette::SceneImage image = renderer.run(camera);
-  const std::vector<uint8_t> alpha = plane_of<uint8_t>(image, MAQ_SCENE_PLANE_ALPHA, camera);
-  const std::vector<float> depth = plane_of<float>(image, MAQ_SCENE_PLANE_DEPTH, camera);
+  const maquette::Image image = renderer.run(camera);
+  EXPECT_EQ(image.width_px(), 100);
+  EXPECT_EQ(image.height_px(), 80);
+  const void* none = nullptr;
+  size_t no_stride = 0;
+  EXPECT_EQ(maq_image_get_plane(image.get(), MAQ_IMAGE_PLANE_NORMALS, &none, &no_stride), MAQ_ERROR_INVALID_ARGUMENT);
+  const std::vector<uint8_t> alpha = plane_of<uint8_t>(image, MAQ_IMAGE_PLANE_ALPHA, camera);
+  const std::vector<float> depth = plane_of<float>(image, MAQ_IMAGE_PLANE_DEPTH, camera);
   const size_t middle = 40 * 100 + 50;
   EXPECT_EQ(alpha[middle], 255);
   EXPECT_NEAR(depth[middle], 2, 0.1) << "a ball of radius 1, seen from 3 away";
   EXPECT_EQ(alpha[0], 0);
   EXPECT_EQ(depth[0], 0);
-  const maq_scene_image_stats stats = image.stats();
+  const maq_scene_render_stats stats = image.scene_stats();
   EXPECT_GT(stats.drawn_point_count, 1000u);
   EXPECT_GT(stats.shaded_point_count, 300u);
   EXPECT_LE(stats.shaded_point_count, stats.drawn_point_count);
@@ -66,18 +71,17 @@ TEST_F(ApiSceneRendering, GivesPlanesAndStats) {
   const void* pixels = nullptr;
   size_t stride = 0;
   for (const int wrong : {0, 4}) {
-    EXPECT_EQ(maq_scene_image_get_plane(image.get(), maq_scene_plane(wrong), &pixels, &stride),
-              MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(maq_image_get_plane(image.get(), maq_image_plane(wrong), &pixels, &stride), MAQ_ERROR_INVALID_ARGUMENT);
   }
 }
 
 TEST_F(ApiSceneRendering, SavedImagesAreThePlanes) {
   const maq_pinhole_camera camera = camera_at(0.3, 100, 80);
   maquette::SceneRenderer renderer(context_, api_tiny_scene::renderer_config(), scene_);
-  const maquette::SceneImage image = renderer.run(camera);
+  const maquette::Image image = renderer.run(camera);
   const TempFolder folder;
   image.save(folder.file("plain.png"));
-  image.save(folder.file("alpha.png"), true);
+  image.save(folder.file("alpha.png"), MAQ_IMAGE_ALPHA_ON);
   image.save(folder.file("photo.jpg"));
   maquette::Source source(context_, "image:" + folder.file("plain.png"));
   const maq_frame_desc desc = source.next()->desc();
@@ -86,12 +90,13 @@ TEST_F(ApiSceneRendering, SavedImagesAreThePlanes) {
   const std::string alpha = read_text(folder.file("alpha.png"));
   EXPECT_EQ(alpha[25], 6) << "PNG's colour type with alpha";
   EXPECT_EQ(read_text(folder.file("plain.png"))[25], 2);
-  EXPECT_EQ(maq_scene_image_save(image.get(), folder.file("alpha.jpg").c_str(), 1), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_scene_image_save(image.get(), "/no/such/folder/a.png", 0), MAQ_ERROR_UNWRITABLE);
+  EXPECT_EQ(maq_image_save(image.get(), folder.file("alpha.jpg").c_str(), MAQ_IMAGE_ALPHA_ON),
+            MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_image_save(image.get(), "/no/such/folder/a.png", MAQ_IMAGE_ALPHA_OFF), MAQ_ERROR_UNWRITABLE);
 }
 
 TEST_F(ApiSceneRendering, ImagesAreBoundedReusedAndOutliveEverything) {
-  std::vector<maquette::SceneImage> held;
+  std::vector<maquette::Image> held;
   const maq_pinhole_camera camera = camera_at(0);
   std::vector<uint8_t> expected;
   {
@@ -102,7 +107,7 @@ TEST_F(ApiSceneRendering, ImagesAreBoundedReusedAndOutliveEverything) {
     maquette::SceneRenderer renderer(context, config, *scene);
     scene.reset();
     for (int i = 0; i < 2; ++i) held.push_back(renderer.run(camera));
-    maq_scene_image* image = nullptr;
+    maq_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_POOL_EMPTY);
     EXPECT_EQ(image, nullptr);
     held.pop_back();
@@ -121,14 +126,14 @@ TEST_F(ApiSceneRendering, WhereNothingIsSeenThereIsTheBackgroundAndNoNetworkRuns
   maquette::SceneRenderer renderer(context_, config, scene_);
   maq_pinhole_camera camera = camera_at(0);
   camera.centre[0] = -3;
-  const maquette::SceneImage image = renderer.run(camera);
+  const maquette::Image image = renderer.run(camera);
   const std::vector<uint8_t> bgr = bgr_of(image, camera);
   for (size_t i = 0; i < bgr.size(); i += 3) {
     ASSERT_TRUE(bgr[i] == 50 && bgr[i + 1] == 100 && bgr[i + 2] == 200) << i;
   }
-  for (const float depth : plane_of<float>(image, MAQ_SCENE_PLANE_DEPTH, camera)) ASSERT_EQ(depth, 0);
-  EXPECT_EQ(image.stats().refined_pixel_count, 0);
-  EXPECT_EQ(image.stats().shaded_point_count, 0u);
+  for (const float depth : plane_of<float>(image, MAQ_IMAGE_PLANE_DEPTH, camera)) ASSERT_EQ(depth, 0);
+  EXPECT_EQ(image.scene_stats().refined_pixel_count, 0);
+  EXPECT_EQ(image.scene_stats().shaded_point_count, 0u);
 }
 
 TEST_F(ApiSceneRendering, OverTheBackgroundItIsMixedByAlpha) {
@@ -140,9 +145,9 @@ TEST_F(ApiSceneRendering, OverTheBackgroundItIsMixedByAlpha) {
     config.background[1] = 255;
     config.use_background = over;
     maquette::SceneRenderer renderer(context_, config, scene_);
-    const maquette::SceneImage image = renderer.run(camera);
+    const maquette::Image image = renderer.run(camera);
     pictures[over] = bgr_of(image, camera);
-    alpha = plane_of<uint8_t>(image, MAQ_SCENE_PLANE_ALPHA, camera);
+    alpha = plane_of<uint8_t>(image, MAQ_IMAGE_PLANE_ALPHA, camera);
   }
   size_t between = 0;
   for (size_t i = 0; i < alpha.size(); ++i) {
@@ -165,7 +170,7 @@ TEST_F(ApiSceneRendering, PicturesHaveAnySizeUpToTheLimit) {
   const std::pair<int, int> wrong[] = {{0, 10}, {10, -1}, {20000, 10}, {16000, 16000}, {INT32_MAX, INT32_MAX}};
   for (const auto& [width, height] : wrong) {
     const maq_pinhole_camera camera = camera_at(0, width, height);
-    maq_scene_image* image = nullptr;
+    maq_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_IMAGE_SIZE) << width;
     EXPECT_EQ(image, nullptr);
   }
@@ -178,7 +183,7 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
   const auto expect = [&](const std::string& text, auto change) {
     maq_pinhole_camera camera = camera_at(0);
     change(camera);
-    maq_scene_image* image = nullptr;
+    maq_image* image = nullptr;
     EXPECT_EQ(maq_scene_renderer_run(renderer.get(), &camera, &image), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_NE(std::string(maq_last_error(renderer.get())).find(text), std::string::npos)
         << maq_last_error(renderer.get());
@@ -193,7 +198,7 @@ TEST_F(ApiSceneRendering, CamerasThatAreNoneAreRefusedAndCostNoImage) {
   expect("not finite", [=](auto& camera) { camera.rotation[4] = nan; });
   expect("rotation", [](auto& camera) { camera.rotation[5] = 0; });
   expect("camera.struct_size", [](auto& camera) { camera.struct_size += 8; });
-  EXPECT_GT(renderer.run(camera_at(0)).stats().shaded_point_count, 0u);
+  EXPECT_GT(renderer.run(camera_at(0)).scene_stats().shaded_point_count, 0u);
 }
 
 TEST_F(ApiSceneRendering, PointsNearerThanTheNearDepthAreNotDrawn) {
@@ -201,26 +206,8 @@ TEST_F(ApiSceneRendering, PointsNearerThanTheNearDepthAreNotDrawn) {
   config.near_depth = 2.5;
   maquette::SceneRenderer renderer(context_, config, scene_);
   const maq_pinhole_camera camera = camera_at(0);
-  for (const float depth : plane_of<float>(renderer.run(camera), MAQ_SCENE_PLANE_DEPTH, camera)) {
+  for (const float depth : plane_of<float>(renderer.run(camera), MAQ_IMAGE_PLANE_DEPTH, camera)) {
     ASSERT_TRUE(depth == 0 || depth >= 2.49f) << depth;
-  }
-}
-
-TEST_F(ApiSceneRendering, WorkThatCanBeLeftOutChangesNoCoveredPixel) {
-  const maq_pinhole_camera camera = camera_at(0.4, 200, 160);
-  maquette::SceneRenderer usual(context_, renderer_config(), scene_);
-  const maquette::SceneImage expected = usual.run(camera);
-  const std::vector<uint8_t> alpha = plane_of<uint8_t>(expected, MAQ_SCENE_PLANE_ALPHA, camera);
-  maq_scene_renderer_config config = renderer_config();
-  config.draw_unseen_blocks = config.refine_empty_parts = 1;
-  maquette::SceneRenderer thorough(context_, config, scene_);
-  const maquette::SceneImage found = thorough.run(camera);
-  EXPECT_GE(found.stats().refined_pixel_count, expected.stats().refined_pixel_count);
-  EXPECT_EQ(found.stats().shaded_point_count, expected.stats().shaded_point_count);
-  const std::vector<uint8_t> a = bgr_of(expected, camera), b = bgr_of(found, camera);
-  for (size_t i = 0; i < alpha.size(); ++i) {
-    if (alpha[i] == 0) continue;
-    for (size_t c = 0; c < 3; ++c) ASSERT_NEAR(a[3 * i + c], b[3 * i + c], 1) << i;
   }
 }
 
@@ -232,7 +219,7 @@ TEST_F(ApiSceneRendering, SeveralRenderersOfOneSceneRunAtOnce) {
   for (int t = 0; t < 2; ++t) {
     threads.emplace_back([&] {
       maq_scene_renderer_config config = renderer_config();
-      config.threads = 2;
+      config.model.threads = 2;
       maquette::SceneRenderer renderer(context_, config, scene_);
       for (int i = 0; i < 3; ++i) EXPECT_EQ(bgr_of(renderer.run(camera), camera), expected);
     });
@@ -246,24 +233,21 @@ TEST_F(ApiSceneRendering, SettingsOutOfRangeAreRefusedByName) {
     change(config);
     expect_refused(config, MAQ_ERROR_INVALID_ARGUMENT, name);
   };
-  expect("config.threads", [](auto& config) { config.threads = 65; });
-  expect("config.image_pool_size is 0", [](auto& config) { config.image_pool_size = 0; });
+  expect("config.model.threads", [](auto& config) { config.model.threads = 65; });
   expect("config.image_pool_size is 65", [](auto& config) { config.image_pool_size = 65; });
-  expect("config.allow_spinning is 2", [](auto& config) { config.allow_spinning = 2; });
-  expect("config.provider is -1", [](auto& config) { reinterpret_cast<int32_t&>(config.provider) = -1; });
+  expect("config.model.spinning is 3", [](auto& config) { reinterpret_cast<int32_t&>(config.model.spinning) = 3; });
+  expect("config.model.provider is -1", [](auto& config) { reinterpret_cast<int32_t&>(config.model.provider) = -1; });
   expect("config.near_depth", [](auto& config) { config.near_depth = -1; });
   expect("config.near_depth", [](auto& config) { config.near_depth = std::numeric_limits<double>::quiet_NaN(); });
   expect("config.use_background is 2", [](auto& config) { config.use_background = 2; });
-  expect("config.draw_unseen_blocks", [](auto& config) { config.draw_unseen_blocks = 2; });
-  expect("config.refine_empty_parts", [](auto& config) { config.refine_empty_parts = 2; });
   expect("config.struct_size is 3", [](auto& config) { config.struct_size = 3; });
 }
 
 TEST_F(ApiSceneRendering, OtherNetworksThanTheScenesAreRefused) {
   maq_scene_renderer_config config = renderer_config();
-  config.bundle_path = "/no/such/bundle";
+  config.model.bundle_path = "/no/such/bundle";
   expect_refused(config, MAQ_ERROR_NOT_FOUND, "/no/such/bundle");
-  config.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
+  config.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
   expect_refused(config, MAQ_ERROR_UNSUPPORTED, "the task scenes");
   const TempFolder folder;
   std::filesystem::copy(api_tiny_scene::kBundle, folder.file("bundle"));
@@ -271,7 +255,7 @@ TEST_F(ApiSceneRendering, OtherNetworksThanTheScenesAreRefused) {
   std::string numbers = read_text(basis);
   numbers[0] = char(numbers[0] ^ 1);
   write_text(basis, numbers);
-  config.bundle_path = bundle.c_str();
+  config.model.bundle_path = bundle.c_str();
   expect_refused(config, MAQ_ERROR_BAD_BUNDLE, "basis.bin has SHA-256");
   // Sound, but not those of the scene.
   ASSERT_EQ(std::system(("sha256sum '" + basis + "' > '" + folder.file("sum") + "'").c_str()), 0);

@@ -19,7 +19,7 @@ class ApiScenes : public ::testing::Test {
     maq_scene* scene = nullptr;
     const maq_status status = maq_scene_open(context_.get(), path.c_str(), &scene);
     EXPECT_EQ(scene != nullptr, status == MAQ_OK);
-    maq_scene_close(scene);
+    maq_scene_destroy(scene);
     return status;
   }
 

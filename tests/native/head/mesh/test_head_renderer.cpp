@@ -14,7 +14,7 @@ namespace head_renderer_tests {
 namespace {
 
 using maq::PinholeCamera;
-using maq::head::HeadPicture;
+using maq::RenderedImage;
 using maq::head::HeadRenderer;
 using maq::head::HeadRenderOptions;
 using maq::head::MeshShading;
@@ -47,14 +47,14 @@ Hit hit_of(const PinholeCamera& camera, double column_px, double row_px) {
 
 HeadRenderOptions with_shading(MeshShading shading) {
   HeadRenderOptions options;
-  options.shading = shading, options.light = 0, options.threads = 2;
+  options.shading = shading, options.shading_strength = 0, options.threads = 2;
   return options;
 }
 
 TEST(HeadRenderer, ShowsWhereRaysMeetTheBallInMetres) {
   HeadRenderer renderer(ball_mesh(0.02f), std::nullopt, with_shading(MeshShading::kColour));
   const PinholeCamera camera = from_the_front();
-  HeadPicture picture;
+  RenderedImage picture;
   renderer.render(camera, picture);
   double coverage = 0, expected_coverage = 0;
   int inside = 0;
@@ -96,7 +96,7 @@ TEST(HeadRenderer, EdgesAreSmoothOrNot) {
     HeadRenderOptions options = with_shading(MeshShading::kColour);
     options.is_smooth = is_smooth;
     HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, options);
-    HeadPicture picture;
+    RenderedImage picture;
     renderer.render(camera, picture);
     int between = 0;
     for (const uint8_t alpha : picture.alpha) between += alpha != 0 && alpha != 255 ? 1 : 0;
@@ -117,7 +117,7 @@ TEST(HeadRenderer, EachShadingTellsItsQuantity) {
   const double normal[3] = {hit.x_m / kRadius_m, hit.y_m / kRadius_m, (hit.depth_m - kDistance_m) / kRadius_m};
   const auto expect_rgb = [&](MeshShading shading, double red, double green, double blue) {
     renderer.set_shading(shading);
-    HeadPicture picture;
+    RenderedImage picture;
     renderer.render(camera, picture);
     EXPECT_NEAR(picture.bgr[3 * pixel + 2], red, 3) << int(shading);
     EXPECT_NEAR(picture.bgr[3 * pixel + 1], green, 3) << int(shading);
@@ -137,7 +137,7 @@ TEST(HeadRenderer, TheBackgroundLiesUnderTheHead) {
   HeadRenderer plain(ball_mesh(0.05f), std::nullopt, options);
   options.background_rgb = {10, 20, 250};
   HeadRenderer over(ball_mesh(0.05f), std::nullopt, options);
-  HeadPicture without, with;
+  RenderedImage without, with;
   plain.render(from_the_front(), without);
   over.render(from_the_front(), with);
   EXPECT_EQ(without.bgr[0], 0);
@@ -159,7 +159,7 @@ TEST(HeadRenderer, TheOrbitSeesTheWholeHeadFromWhereItSays) {
     for (const auto& [width, height] : {std::pair{200, 100}, std::pair{100, 200}}) {
       const PinholeCamera camera = renderer.orbit_camera(yaw, pitch, width, height);
       EXPECT_GT(sign * camera.centre[size_t(axis)], 0.3);
-      HeadPicture picture;
+      RenderedImage picture;
       renderer.render(camera, picture);
       int first_row = height, last_row = -1, first_column = width, last_column = -1;
       for (int i = 0; i < width * height; ++i) {
@@ -180,7 +180,7 @@ TEST(HeadRenderer, TheOrbitSeesTheWholeHeadFromWhereItSays) {
 
 TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
   HeadRenderer renderer(ball_mesh(0.1f), std::nullopt, with_shading(MeshShading::kColour));
-  HeadPicture picture;
+  RenderedImage picture;
   const auto refused = [&](maq_status status, const char* text, auto&& change) {
     PinholeCamera camera = from_the_front(20, 16);
     change(camera);
@@ -228,17 +228,17 @@ TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
 TEST(HeadRenderer, TwoInTwoThreadsDrawWhatOneThreadDraws) {
   HeadRenderOptions options = with_shading(MeshShading::kColour);
   options.threads = 1;
-  const auto turned = [&](HeadRenderer& renderer, int step, HeadPicture& picture) {
+  const auto turned = [&](HeadRenderer& renderer, int step, RenderedImage& picture) {
     renderer.render(renderer.orbit_camera(0.7 * step, 0.1 * step, 120 + step, 90), picture);
   };
-  std::vector<HeadPicture> expected(6);
+  std::vector<RenderedImage> expected(6);
   HeadRenderer one(ball_mesh(0.05f), std::nullopt, options);
   for (int step = 0; step < 6; ++step) turned(one, step, expected[size_t(step)]);
   const auto run = [&] {
     HeadRenderOptions two = options;
     two.threads = 2;
     HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, two);
-    HeadPicture picture;
+    RenderedImage picture;
     for (int step = 0; step < 6; ++step) {
       turned(renderer, step, picture);
       EXPECT_EQ(picture.bgr, expected[size_t(step)].bgr);

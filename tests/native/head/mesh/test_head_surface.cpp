@@ -1,4 +1,4 @@
-// The mesh of a stored head and its named places, on a field whose surface is known exactly.
+// The mesh of a stored head and its landmarks, on a field whose surface is known exactly.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -139,18 +139,18 @@ TEST(HeadSurface, PlacesLieWhereTheAnchorsAroundThemDo) {
     for (size_t axis = 0; axis < 3; ++axis) head.anchors.points.push_back(p[axis] / 2 + (axis == 0 ? 0.25f : 0));
     head.anchors.sigma.push_back(0.01f * float(i + 1));
   }
-  head.places = {{"nose_tip", {0.1f, -0.4f, 0}}, {"anchor", {0.15f, 0.15f, 0.15f}}};
-  const HeadPlace nose = find_head_place(head, "nose_tip");
+  head.landmarks = {{"nose_tip", {0.1f, -0.4f, 0}}, {"anchor", {0.15f, 0.15f, 0.15f}}};
+  const HeadLandmark nose = find_head_landmark(head, "nose_tip");
   EXPECT_NEAR(nose.point.x, 0.35, 1e-6);
   EXPECT_NEAR(nose.point.y, -0.4, 1e-6);
   EXPECT_NEAR(nose.point.z, 0, 1e-6);
   EXPECT_GT(nose.sigma, 0.01);
   EXPECT_LT(nose.sigma, 0.08);
-  const HeadPlace anchor = find_head_place(head, "anchor");
+  const HeadLandmark anchor = find_head_landmark(head, "anchor");
   EXPECT_NEAR(anchor.point.x, 0.4, 1e-6);
   EXPECT_NEAR(anchor.sigma, 0.01, 1e-6);
-  expect_error(MAQ_ERROR_NOT_FOUND, "no place named \"elbow\"; it has nose_tip, anchor.",
-               [&] { find_head_place(head, "elbow"); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "no landmark named \"elbow\"; it has nose_tip, anchor.",
+               [&] { find_head_landmark(head, "elbow"); });
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ HeadMesh with_morph_targets(HeadMesh mesh) {
   for (size_t i = 0; i < mesh.vertex_count(); ++i) {
     if (mesh.positions[3 * i + 2] > -0.4f) continue;
     open.vertices.push_back(uint32_t(i));
-    open.moves.insert(open.moves.end(), {0, 0.02f, -0.2f});
+    open.deltas.insert(open.deltas.end(), {0, 0.02f, -0.2f});
   }
   mesh.morph_targets = {open, {"eyeBlinkLeft", {}, {}}};
   return mesh;
@@ -216,7 +216,7 @@ TEST(MeshFiles, WhatIsWrongWithAMeshIsSaidAndNoFileIsLeft) {
   mesh.triangles[4] = uint32_t(mesh.vertex_count());
   refuse("A triangle of the mesh has vertex", mesh);
   mesh = with_morph_targets(example());
-  mesh.morph_targets[0].moves.pop_back();
+  mesh.morph_targets[0].deltas.pop_back();
   refuse("The morph target jawOpen", mesh);
   mesh = with_morph_targets(example());
   mesh.morph_targets[0].vertices.back() = uint32_t(mesh.vertex_count());

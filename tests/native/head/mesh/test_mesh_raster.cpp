@@ -10,11 +10,11 @@
 
 namespace {
 
+using maq::RenderedImage;
 using maq::WorkerThreads;
 using maq::head::HeadCamera;
 using maq::head::HeadMesh;
 using maq::head::MeshRaster;
-using maq::head::RasterImage;
 
 // From the front, 6 away: x of the head to the right, z up.
 HeadCamera front(int width_px, int height_px) {
@@ -36,7 +36,7 @@ HeadMesh one_triangle(std::vector<float> positions) {
 TEST(MeshRaster, ShowsABallWhereRaysMeetIt) {
   WorkerThreads threads(2);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   const HeadMesh mesh = ball_mesh(0.02f);
   const HeadCamera camera = front(160, 120);
   maq::head::RasterOptions options;
@@ -72,7 +72,7 @@ TEST(MeshRaster, TwoThreadsDrawThePictureOfOne) {
   const HeadMesh mesh = ball_mesh(0.05f);
   WorkerThreads one(1), two(2);
   MeshRaster raster;
-  RasterImage a, b;
+  RenderedImage a, b;
   raster.draw(mesh, front(161, 123), {}, one, a);
   raster.draw(mesh, front(161, 123), {}, two, b);
   EXPECT_EQ(a.bgr, b.bgr);
@@ -83,7 +83,7 @@ TEST(MeshRaster, TwoThreadsDrawThePictureOfOne) {
 TEST(MeshRaster, ClosedMeshesHaveNoHoles) {
   WorkerThreads threads(1);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   const HeadMesh mesh = ball_mesh(0.1f);
   HeadCamera camera = front(320, 320);
   camera.cx_px = camera.cy_px = 160;  // grid lines of the mesh fall on pixels
@@ -100,7 +100,7 @@ TEST(MeshRaster, ClosedMeshesHaveNoHoles) {
 TEST(MeshRaster, TheGroundToTheHorizonIsCutAtTheNearPlane) {
   WorkerThreads threads(1);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   HeadCamera camera;
   camera.width_px = 41, camera.height_px = 40, camera.focal_px = 20, camera.cx_px = 20, camera.cy_px = 20;
   // One triangle in y = 1 that begins behind the camera.
@@ -123,7 +123,7 @@ TEST(MeshRaster, TheGroundToTheHorizonIsCutAtTheNearPlane) {
 TEST(MeshRaster, WhatIsDegenerateOrBehindIsSkipped) {
   WorkerThreads threads(1);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   HeadCamera camera;
   camera.width_px = 16, camera.height_px = 16, camera.focal_px = 8, camera.cx_px = 8, camera.cy_px = 8;
   for (const HeadMesh& mesh :
@@ -140,7 +140,7 @@ TEST(MeshRaster, WhatIsDegenerateOrBehindIsSkipped) {
 TEST(MeshRaster, CamerasThatCannotBeAreRefused) {
   WorkerThreads threads(1);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   HeadCamera camera = front(0, 10);
   expect_error(MAQ_ERROR_IMAGE_SIZE, "0x10 pixels", [&] { raster.draw({}, camera, {}, threads, image); });
   camera = front(10, 10);

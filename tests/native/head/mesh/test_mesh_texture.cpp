@@ -10,13 +10,13 @@
 namespace mesh_texture_tests {
 
 using maq::Frame;
+using maq::RenderedImage;
 using maq::WorkerThreads;
 using maq::head::HeadCamera;
 using maq::head::HeadMesh;
 using maq::head::MeshRaster;
 using maq::head::MeshShading;
 using maq::head::MeshTexture;
-using maq::head::RasterImage;
 using maq::head::RasterOptions;
 
 // Of pixels given by their row and column as B, G, R.
@@ -55,11 +55,11 @@ HeadCamera camera_of(int side_px) {
   return camera;
 }
 
-RasterImage picture_of(const HeadMesh& mesh, const MeshTexture* texture, int side_px,
-                       MeshShading shading = MeshShading::kColour) {
+RenderedImage picture_of(const HeadMesh& mesh, const MeshTexture* texture, int side_px,
+                         MeshShading shading = MeshShading::kColour) {
   WorkerThreads threads(2);
   MeshRaster raster;
-  RasterImage image;
+  RenderedImage image;
   RasterOptions options;
   options.ambient = 1;
   options.shading = shading;
@@ -110,7 +110,7 @@ TEST(MeshTexture, ATexelIsAboutAsLargeAsAPixel) {
 TEST(MeshTexture, AMeshShowsItWhereItsCoordinatesSay) {
   const auto colour = [](int row, int column) { return Bgr{8 * row, 8 * column, (row * column) % 7 * 30}; };
   const MeshTexture texture = texture_of(32, 32, colour);
-  const RasterImage image = picture_of(square(), &texture, 32);
+  const RenderedImage image = picture_of(square(), &texture, 32);
   for (int row = 1; row < 31; ++row) {
     for (int column = 1; column < 31; ++column) {
       for (size_t c = 0; c < 3; ++c) {
@@ -131,7 +131,7 @@ TEST(MeshTexture, FarAwayItIsItsMeanAndNoPattern) {
     const int value = (row + column) % 2 * 200;
     return Bgr{value, value, value};
   });
-  const RasterImage image = picture_of(square(), &texture, 16);
+  const RenderedImage image = picture_of(square(), &texture, 16);
   for (size_t i = 0; i < image.alpha.size(); ++i) {
     if (image.alpha[i] == 255) {
       EXPECT_NEAR(image.bgr[3 * i], 100, 1) << i;

@@ -40,7 +40,7 @@ StoredHead drawn_head(double sigmas, unsigned seed) {
   for (int k = 0; k < prior.colour_codes(); ++k) codes.colour.push_back(float(sigmas) * normal(random));
   StoredHead head(prior.bases.combine(codes));
   head.codes = codes;
-  head.cut = prior.cut, head.bounds = prior.bounds, head.places = prior.places;
+  head.cut = prior.cut, head.bounds = prior.bounds, head.landmarks = prior.landmarks;
   const HeadAnchors& anchors = prior.anchors;
   head.anchors = {anchors.template_points, anchors.mean, anchors.sigma};
   for (size_t i = 0; i < anchors.mean.size(); ++i) {
@@ -86,9 +86,9 @@ TEST(RegisteredTemplate, IsAMeshOfTheTemplatesVerticesInTrueDecimetres) {
     const MorphTarget &one = mesh.morph_targets[k], &two = twice.morph_targets[k];
     ASSERT_EQ(one.name, onto.actions[k].name);
     ASSERT_EQ(one.vertices, two.vertices);
-    ASSERT_EQ(one.moves.size(), 3 * one.vertices.size());
+    ASSERT_EQ(one.deltas.size(), 3 * one.vertices.size());
     ASSERT_GE(one.vertices.size(), onto.actions[k].points.size());
-    for (size_t i = 0; i < one.moves.size(); ++i) ASSERT_NEAR(two.moves[i], 2 * one.moves[i], 1e-5);
+    for (size_t i = 0; i < one.deltas.size(); ++i) ASSERT_NEAR(two.deltas[i], 2 * one.deltas[i], 1e-5);
   }
 }
 

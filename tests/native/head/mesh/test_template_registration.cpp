@@ -68,7 +68,7 @@ HeadTemplate ball() {
   for (uint32_t i = 0; i < inside; ++i) {
     if (made.points[3 * i + 1] > -0.3f) continue;
     action.points.push_back(i);
-    action.moves.insert(action.moves.end(), {0, 0, -0.1f});
+    action.deltas.insert(action.deltas.end(), {0, 0, -0.1f});
   }
   made.actions.push_back(action);
   return made;

@@ -61,10 +61,10 @@ TexturePhoto photo_from(Vec3 from, Rgb rgb, float matte = 1) {
   return photo;
 }
 
-TextureImage bake(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, bool is_mirrored = false,
-                  int thread_count = 1, bool is_unlit = false) {
+TextureImage bake(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, bool mirror_unseen = false,
+                  int thread_count = 1, bool delight = false) {
   maq::WorkerThreads threads(thread_count);
-  return bake_texture(mesh, photos, {kSide, is_mirrored, is_unlit}, threads);
+  return bake_texture(mesh, photos, {kSide, mirror_unseen, delight}, threads);
 }
 
 Rgb at(const TextureImage& image, Vec3 point) {

@@ -16,16 +16,16 @@ inline const std::string kBundle = MAQ_TEST_DATA "/tiny_scene/bundle";
 
 inline maq_scene_build_config build_config() {
   maq_scene_build_config config = maquette::default_scene_build_config();
-  config.bundle_path = kBundle.c_str();
-  config.threads = 1;
+  config.model.bundle_path = kBundle.c_str();
+  config.model.threads = 1;
   return config;
 }
 
 inline maq_scene_renderer_config renderer_config() {
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
-  config.bundle_path = kBundle.c_str();
-  config.threads = 1;
-  config.allow_spinning = 0;
+  config.model.bundle_path = kBundle.c_str();
+  config.model.threads = 1;
+  config.model.spinning = MAQ_SPINNING_OFF;
   return config;
 }
 

@@ -7,7 +7,10 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <maquette/maquette.hpp>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace round_heads {
@@ -35,13 +38,42 @@ inline maq_head_photo with_box(float left, float top, float right, float bottom)
   return photo;
 }
 
-inline maq_head_mesh_options of_cell(double cell_m) {
-  maq_head_mesh_options options = maquette::default_head_mesh_options();
-  options.cell_m = cell_m;
-  return options;
+// Calls a function with the fraction done; what it returns goes on or cancels.
+struct ProgressCalls {
+  std::function<bool(double done)> function;
+  std::string last_stage;
+
+  static int32_t call(void* calls, double done, const char* stage) {
+    auto* const self = static_cast<ProgressCalls*>(calls);
+    self->last_stage = stage;
+    return !self->function || self->function(done) ? 1 : 0;
+  }
+};
+
+inline maq_head_builder_config builder_config(ProgressCalls* progress) {
+  maq_head_builder_config config = maquette::default_head_builder_config();
+  config.model.bundle_path = kHeadsBundle;
+  config.progress_callback = ProgressCalls::call;
+  config.progress_user_data = progress;
+  return config;
 }
 
-inline const maq_head_mesh_options coarse = of_cell(0.008);
+inline maq_head_mesh_config of_cell(double cell_m) {
+  maq_head_mesh_config config = maquette::default_head_mesh_config();
+  config.cell_m = cell_m;
+  return config;
+}
+
+inline const maq_head_mesh_config coarse = of_cell(0.008);
+
+// A mesh with its arrays.
+struct Mesh : maq_head_mesh_data {
+  explicit Mesh(const maquette::Head& head, const maq_head_mesh_config& config = maquette::default_head_mesh_config())
+      : maq_head_mesh_data{}, mesh(head, config) {
+    static_cast<maq_head_mesh_data&>(*this) = mesh.data();
+  }
+  maquette::HeadMesh mesh;
+};
 
 class RoundHeads : public testing::Test {
  protected:
@@ -57,12 +89,22 @@ class RoundHeads : public testing::Test {
     builder.add_photo(frame, known);
     return builder.fit(seconds);
   }
+  // `called` is called with the fraction done, for this fit alone.
+  maquette::Head fit(double seconds, std::function<bool(double)> called) {
+    progress.function = std::move(called);
+    struct Reset {
+      ProgressCalls& calls;
+      ~Reset() { calls.function = nullptr; }
+    } reset{progress};
+    return builder.fit(seconds);
+  }
 
   const maquette::Context context;
   const PlainPhoto image, black{320, 240, {0, 0, 0}}, blue{320, 240, {200, 60, 20}};
   const maquette::Frame frame{context, image.desc}, black_frame{context, black.desc}, blue_frame{context, blue.desc};
   const maq_head_photo known = with_box(110, 60, 200, 180);
-  maquette::HeadBuilder builder{context, kHeadsBundle};
+  ProgressCalls progress;
+  maquette::HeadBuilder builder{context, builder_config(&progress)};
 };
 
 }  // namespace round_heads

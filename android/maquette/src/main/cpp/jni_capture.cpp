@@ -15,7 +15,7 @@ MAQ_NATIVE_OF(NativeScene, jlong, openCapture)(JNIEnv* env, jclass, jlong contex
 }
 
 MAQ_NATIVE_OF(NativeScene, void, closeCapture)(JNIEnv*, jclass, jlong capture) {
-  maq_capture_close(object<maq_capture>(capture));
+  maq_capture_destroy(object<maq_capture>(capture));
 }
 
 // Counts of views, points and drops, then the up vector.

@@ -1,5 +1,4 @@
-// Configurations that several native methods read: bundles of networks, dense pose, sources, meshes of heads,
-// cameras.
+// Configurations that several native methods read: bundles of networks, dense pose, sources, cameras.
 #pragma once
 
 #include <algorithm>
@@ -85,18 +84,6 @@ inline maq_source_config source_config(JNIEnv* env, jdoubleArray values) {
   config.loop = int32_t(from[5]);
   config.max_side_px = int32_t(from[6]);
   return config;
-}
-
-// `values` as in HeadMeshOptions. `bundle` must live until the C API has been called.
-inline maq_head_mesh_options head_mesh_options(JNIEnv* env, const Bundle& bundle, jdoubleArray values) {
-  const std::vector<jdouble> from = numbers(env, values, 3);
-  maq_head_mesh_options options;
-  check(maq_head_mesh_options_init(&options, sizeof options));
-  bundle.put_into(options);
-  options.triangle_count = count_of(from[0]);  // -1 is MAQ_HEAD_ALL_TRIANGLES
-  options.cell_m = from[1];
-  options.topology = maq_head_topology(int32_t(from[2]));
-  return options;
 }
 
 inline std::vector<jdouble> values_of(const maq_intrinsics& from) {

@@ -1,4 +1,4 @@
-// Heads: files, places, cameras, and meshes.
+// Heads: files, landmarks, cameras, and meshes.
 #include "jni_config.h"
 
 using maq_jni::call;
@@ -47,23 +47,23 @@ jbyteArray file_of(JNIEnv* env, const uint8_t* data, size_t size_bytes) {
   return array;
 }
 
-// Its name, vertices and moves.
-jobjectArray morph_target_of(JNIEnv* env, const maq_head* head, uint32_t index) {
+// Its name, vertices and deltas.
+jobjectArray morph_target_of(JNIEnv* env, const maq_head_mesh* mesh, uint32_t index) {
   auto target = sized<maq_head_morph_target>();
-  check(maq_head_get_morph_target(head, index, &target));
+  check(maq_head_mesh_get_morph_target(mesh, index, &target));
   jobjectArray parts = object_array(env, 3);
   put(env, parts, 0, maq_jni::bytes_of(env, target.name));
   jintArray vertices = env->NewIntArray(jsize(target.vertex_count));
   check_pending(env);
   env->SetIntArrayRegion(vertices, 0, jsize(target.vertex_count), reinterpret_cast<const jint*>(target.vertices));
   put(env, parts, 1, vertices);
-  put(env, parts, 2, maq_jni::floats_of(env, target.moves_m, size_t(3) * target.vertex_count));
+  put(env, parts, 2, maq_jni::floats_of(env, target.deltas_m, size_t(3) * target.vertex_count));
   return parts;
 }
 
-jobjectArray morph_targets_of(JNIEnv* env, const maq_head* head, uint32_t count) {
+jobjectArray morph_targets_of(JNIEnv* env, const maq_head_mesh* mesh, uint32_t count) {
   jobjectArray targets = object_array(env, count);
-  for (uint32_t i = 0; i < count; ++i) put(env, targets, i, morph_target_of(env, head, i));
+  for (uint32_t i = 0; i < count; ++i) put(env, targets, i, morph_target_of(env, mesh, i));
   return targets;
 }
 
@@ -145,41 +145,53 @@ MAQ_NATIVE_OF(NativeHead, jdoubleArray, camera)(JNIEnv* env, jclass, jlong head,
   });
 }
 
-// Positions, normals, colours, template points, triangles, texture coordinates, texture, morph targets. Writes the
-// simplification error.
-MAQ_NATIVE_OF(NativeHead, jobjectArray, mesh)
-(JNIEnv* env, jclass, jlong head, jdoubleArray mesh_options, jbyteArray folder, jobjectArray names,
- jobjectArray buffers, jfloatArray error_m) {
+// `values` as in HeadMesh.Config.
+MAQ_NATIVE_OF(NativeHead, jlong, createMesh)
+(JNIEnv* env, jclass, jlong head, jdoubleArray values, jbyteArray folder, jobjectArray names, jobjectArray buffers) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const maq_head_mesh_options options = maq_jni::head_mesh_options(env, bundle, mesh_options);
-    auto mesh = sized<maq_head_mesh>();
-    auto* const of = object<maq_head>(head);
-    check(maq_head_get_mesh(of, &options, &mesh));
-    env->SetFloatArrayRegion(error_m, 0, 1, &mesh.simplification_error_m);
-    const auto of_vertices = [&](const void* data, size_t bytes) {
-      return direct_copy_of(env, data, bytes * mesh.vertex_count);
-    };
-    constexpr size_t kPointBytes = 3 * sizeof(float);
-    jobjectArray arrays = object_array(env, 8);
-    put(env, arrays, 0, of_vertices(mesh.positions_m, kPointBytes));
-    put(env, arrays, 1, of_vertices(mesh.normals, kPointBytes));
-    put(env, arrays, 2, of_vertices(mesh.colours_rgb, 3));
-    put(env, arrays, 3, of_vertices(mesh.template_points_m, kPointBytes));
-    put(env, arrays, 4, direct_copy_of(env, mesh.triangles, 3 * sizeof(uint32_t) * mesh.triangle_count));
-    put(env, arrays, 5, of_vertices(mesh.texture_coordinates, 2 * sizeof(float)));
-    put(env, arrays, 6, file_of(env, mesh.texture_jpeg, mesh.texture_bytes));
-    put(env, arrays, 7, morph_targets_of(env, of, mesh.morph_target_count));
-    return arrays;
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 3);
+    maq_head_mesh_config config;
+    check(maq_head_mesh_config_init(&config, sizeof config));
+    bundle.put_into(config.model);
+    config.triangle_count = maq_jni::count_of(from[0]);  // -1 is MAQ_HEAD_ALL_TRIANGLES
+    config.cell_m = from[1];
+    config.topology = maq_head_topology(int32_t(from[2]));
+    maq_head_mesh* mesh = nullptr;
+    check(maq_head_mesh_create(object<maq_head>(head), &config, &mesh));
+    return handle(mesh);
   });
 }
 
-MAQ_NATIVE_OF(NativeHead, void, exportMesh)
-(JNIEnv* env, jclass, jlong head, jbyteArray path, jdoubleArray mesh_options, jbyteArray folder, jobjectArray names,
- jobjectArray buffers) {
-  call(env, [&] {
-    const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const maq_head_mesh_options options = maq_jni::head_mesh_options(env, bundle, mesh_options);
-    check(maq_head_export(object<maq_head>(head), maq_jni::text(env, path).c_str(), &options));
+MAQ_NATIVE_OF(NativeHead, void, destroyMesh)(JNIEnv*, jclass, jlong mesh) {
+  maq_head_mesh_destroy(object<maq_head_mesh>(mesh));
+}
+
+MAQ_NATIVE_OF(NativeHead, void, saveMesh)(JNIEnv* env, jclass, jlong mesh, jbyteArray path) {
+  call(env, [&] { check(maq_head_mesh_save(object<maq_head_mesh>(mesh), maq_jni::text(env, path).c_str())); });
+}
+
+// Positions, normals, colours, template points, triangles, texture coordinates, texture, morph targets. Writes the
+// simplification error.
+MAQ_NATIVE_OF(NativeHead, jobjectArray, meshArrays)(JNIEnv* env, jclass, jlong mesh, jfloatArray error_m) {
+  return call(env, [&] {
+    const auto* const of = object<maq_head_mesh>(mesh);
+    auto data = sized<maq_head_mesh_data>();
+    check(maq_head_mesh_get_data(of, &data));
+    env->SetFloatArrayRegion(error_m, 0, 1, &data.simplification_error_m);
+    const auto of_vertices = [&](const void* values, size_t bytes) {
+      return direct_copy_of(env, values, bytes * data.vertex_count);
+    };
+    constexpr size_t kPointBytes = 3 * sizeof(float);
+    jobjectArray arrays = object_array(env, 8);
+    put(env, arrays, 0, of_vertices(data.positions_m, kPointBytes));
+    put(env, arrays, 1, of_vertices(data.normals, kPointBytes));
+    put(env, arrays, 2, of_vertices(data.colours_rgb, 3));
+    put(env, arrays, 3, of_vertices(data.template_points_m, kPointBytes));
+    put(env, arrays, 4, direct_copy_of(env, data.triangles, 3 * sizeof(uint32_t) * data.triangle_count));
+    put(env, arrays, 5, of_vertices(data.texture_coordinates, 2 * sizeof(float)));
+    put(env, arrays, 6, file_of(env, data.texture_jpeg, data.texture_bytes));
+    put(env, arrays, 7, morph_targets_of(env, of, data.morph_target_count));
+    return arrays;
   });
 }

@@ -1,4 +1,4 @@
-// Heads from photos: the builder, and what it calls while it fits.
+// Heads from photos: the builder and its callbacks.
 #include "jni_config.h"
 
 using maq_jni::call;
@@ -17,7 +17,7 @@ class FitCallbacks {
   FitCallbacks(JNIEnv* env, jobject callbacks, bool has_preview)
       : env_(env), callbacks_(callbacks), has_preview_(has_preview), of_outer_fit_(of_this_thread) {
     jclass type = env->GetObjectClass(callbacks);
-    on_progress_ = env->GetMethodID(type, "onProgress", "(D)Z");
+    on_progress_ = env->GetMethodID(type, "onProgress", "(D[B)Z");
     maq_jni::check_pending(env);
     on_preview_ = env->GetMethodID(type, "onPreview", "(J)V");
     maq_jni::check_pending(env);
@@ -28,11 +28,18 @@ class FitCallbacks {
   FitCallbacks& operator=(const FitCallbacks&) = delete;
 
   // For the C API, which calls both on the thread that fits.
-  static int32_t on_progress(void*, double done) {
+  static int32_t on_progress(void*, double done, const char* stage) {
     const FitCallbacks* const to = of_this_thread;
     if (to->env_->ExceptionCheck()) return 0;
-    const jboolean goes_on = to->env_->CallBooleanMethod(to->callbacks_, to->on_progress_, done);
-    return !to->env_->ExceptionCheck() && goes_on == JNI_TRUE ? 1 : 0;
+    try {
+      jbyteArray bytes = maq_jni::bytes_of(to->env_, stage);
+      const jboolean goes_on = to->env_->CallBooleanMethod(to->callbacks_, to->on_progress_, done, bytes);
+      maq_jni::check_pending(to->env_);
+      to->env_->DeleteLocalRef(bytes);
+      return goes_on == JNI_TRUE ? 1 : 0;
+    } catch (const maq_jni::PendingException&) {
+      return 0;
+    }
   }
   static void on_preview(void*, maq_head* head) {
     const FitCallbacks* const to = of_this_thread;
@@ -60,16 +67,18 @@ MAQ_NATIVE_OF(NativeHead, jlong, createBuilder)
 (JNIEnv* env, jclass, jlong context, jbyteArray folder, jobjectArray names, jobjectArray buffers, jdoubleArray values) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
-    const std::vector<jdouble> from = numbers(env, values, 6);
-    maq_head_config config;
-    check(maq_head_config_init(&config, sizeof config));
-    bundle.put_into(config);
-    config.threads = int32_t(from[0]);
-    config.texture_px = maq_jni::count_of(from[1]);
-    config.texture_mirrored = int32_t(from[2]);
-    config.allow_spinning = int32_t(from[3]);
-    config.provider = maq_provider(int32_t(from[4]));
-    config.texture_unlit = int32_t(from[5]);
+    const std::vector<jdouble> from = numbers(env, values, 7);
+    maq_head_builder_config config;
+    check(maq_head_builder_config_init(&config, sizeof config));
+    bundle.put_into(config.model);
+    config.model.threads = int32_t(from[0]);
+    config.model.spinning = from[1] != 0 ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
+    config.model.provider = maq_provider(int32_t(from[2]));
+    config.texture = maq_head_texture(int32_t(from[3]));
+    config.texture_px = maq_jni::count_of(from[4]);
+    config.mirror_unseen = int32_t(from[5]);
+    config.delight_texture = int32_t(from[6]);
+    config.progress_callback = FitCallbacks::on_progress;
     maq_head_builder* builder = nullptr;
     check(maq_head_builder_create(object<maq_context>(context), &config, &builder));
     return handle(builder);
@@ -114,7 +123,7 @@ MAQ_NATIVE_OF(NativeHead, jlong, fit)
     check(maq_head_builder_set_preview(of, has_preview ? preview_interval_s : 0,
                                        has_preview ? FitCallbacks::on_preview : nullptr, nullptr));
     maq_head* head = nullptr;
-    const maq_status status = maq_head_builder_fit(of, seconds, FitCallbacks::on_progress, nullptr, &head);
+    const maq_status status = maq_head_builder_fit(of, seconds, &head);
     if (env->ExceptionCheck()) maq_head_destroy(head);
     maq_jni::check_pending(env);
     check(status);
@@ -128,15 +137,15 @@ MAQ_NATIVE_OF(NativeHead, jfloatArray, photo)(JNIEnv* env, jclass, jlong builder
     auto found = sized<maq_head_photo_info>();
     check(maq_head_builder_get_photo(object<maq_head_builder>(builder), uint32_t(index), &found));
     const jfloat values[] = {found.box_px[0],     found.box_px[1],      found.box_px[2], found.box_px[3],
-                             found.head_fraction, float(found.is_used), found.focal_px,  found.rms_px};
+                             found.head_coverage, float(found.is_used), found.focal_px,  found.rms_px};
     return maq_jni::floats_of(env, values, std::size(values));
   });
 }
 
-// In the order of maq_head_stats.
+// In the order of maq_head_build_stats.
 MAQ_NATIVE_OF(NativeHead, jdoubleArray, builderStats)(JNIEnv* env, jclass, jlong builder) {
   return call(env, [&] {
-    auto s = sized<maq_head_stats>();
+    auto s = sized<maq_head_build_stats>();
     check(maq_head_builder_get_stats(object<maq_head_builder>(builder), &s));
     return maq_jni::doubles_of(
         env, {double(s.photo_count), double(s.used_photo_count), s.encode_ms, s.pose_ms, s.fit_ms, s.total_ms,

@@ -1,4 +1,4 @@
-// Scenes, their renderers, and the images.
+// Scenes and their renderers.
 #include "jni_config.h"
 
 using maq_jni::call;
@@ -23,7 +23,7 @@ MAQ_NATIVE_OF(NativeScene, jlong, openMemory)(JNIEnv* env, jclass, jlong context
   });
 }
 
-MAQ_NATIVE_OF(NativeScene, void, close)(JNIEnv*, jclass, jlong scene) { maq_scene_close(object<maq_scene>(scene)); }
+MAQ_NATIVE_OF(NativeScene, void, close)(JNIEnv*, jclass, jlong scene) { maq_scene_destroy(object<maq_scene>(scene)); }
 
 MAQ_NATIVE_OF(NativeScene, void, save)(JNIEnv* env, jclass, jlong scene, jbyteArray path) {
   call(env, [&] { check(maq_scene_save(object<maq_scene>(scene), maq_jni::text(env, path).c_str())); });
@@ -58,13 +58,13 @@ MAQ_NATIVE_OF(NativeScene, jlong, createRenderer)
     const std::vector<jdouble> from = maq_jni::numbers(env, values, 8);
     maq_scene_renderer_config config;
     check(maq_scene_renderer_config_init(&config, sizeof config));
-    bundle.put_into(config);
-    config.threads = int32_t(from[0]);
+    bundle.put_into(config.model);
+    config.model.threads = int32_t(from[0]);
     config.use_background = int32_t(from[1]);
     for (size_t i = 0; i < 3; ++i) config.background[i] = uint8_t(from[2 + i]);
     config.near_depth = from[5];
     config.image_pool_size = maq_jni::count_of(from[6]);
-    config.allow_spinning = int32_t(from[7]);
+    config.model.spinning = from[7] != 0 ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
     maq_scene_renderer* renderer = nullptr;
     check(maq_scene_renderer_create(object<maq_context>(context), &config, object<maq_scene>(scene), &renderer));
     return handle(renderer);
@@ -78,44 +78,8 @@ MAQ_NATIVE_OF(NativeScene, void, destroyRenderer)(JNIEnv*, jclass, jlong rendere
 MAQ_NATIVE_OF(NativeScene, jlong, render)(JNIEnv* env, jclass, jlong renderer, jdoubleArray camera) {
   return call(env, [&] {
     const maq_pinhole_camera from = maq_jni::pinhole_camera(env, camera);
-    maq_scene_image* image = nullptr;
+    maq_image* image = nullptr;
     check(maq_scene_renderer_run(object<maq_scene_renderer>(renderer), &from, &image));
     return handle(image);
-  });
-}
-
-MAQ_NATIVE_OF(NativeScene, void, releaseImage)(JNIEnv*, jclass, jlong image) {
-  maq_scene_image_release(object<maq_scene_image>(image));
-}
-
-// A plane as a direct buffer over the image's own memory; rows of `row_bytes` follow each other without padding.
-MAQ_NATIVE_OF(NativeScene, jobject, planeOfImage)
-(JNIEnv* env, jclass, jlong image, jint plane, jint row_bytes, jint height_px) {
-  return call(env, [&]() -> jobject {
-    const void* pixels = nullptr;
-    size_t stride = 0;
-    check(maq_scene_image_get_plane(object<maq_scene_image>(image), maq_scene_plane(plane), &pixels, &stride));
-    if (stride != size_t(row_bytes)) throw maq_jni::StatusError{MAQ_ERROR_INTERNAL, "rows of a plane have padding"};
-    // Java gets it read-only (Kotlin: asReadOnlyBuffer).
-    return env->NewDirectByteBuffer(const_cast<void*>(pixels), jlong(stride) * height_px);
-  });
-}
-
-// In the order of maq_scene_image_stats.
-MAQ_NATIVE_OF(NativeScene, jdoubleArray, statsOfImage)(JNIEnv* env, jclass, jlong image) {
-  return call(env, [&] {
-    maq_scene_image_stats s{};
-    s.struct_size = sizeof s;
-    check(maq_scene_image_get_stats(object<maq_scene_image>(image), &s));
-    return maq_jni::doubles_of(
-        env, {s.project_ms, s.shade_ms, s.refine_ms, s.resample_ms, s.total_ms, double(s.drawn_block_count),
-              double(s.drawn_point_count), double(s.shaded_point_count), double(s.refined_pixel_count)});
-  });
-}
-
-MAQ_NATIVE_OF(NativeScene, void, saveImage)
-(JNIEnv* env, jclass, jlong image, jbyteArray path, jboolean with_alpha) {
-  call(env, [&] {
-    check(maq_scene_image_save(object<maq_scene_image>(image), maq_jni::text(env, path).c_str(), with_alpha));
   });
 }

@@ -9,7 +9,7 @@ using maq_jni::object;
 
 namespace {
 
-// A dev.maquette.Progress that the call of this thread tells of its progress.
+// The dev.maquette.NativeProgress of the call of this thread.
 class ProgressOfCall {
  public:
   ProgressOfCall(JNIEnv* env, jobject progress) : env_(env), progress_(progress), of_outer_call_(of_this_thread) {
@@ -52,7 +52,7 @@ class ProgressOfCall {
 
 thread_local const ProgressOfCall* ProgressOfCall::of_this_thread = nullptr;
 
-// A Long of Kotlin; what is negative or no number is refused.
+// A Long of Kotlin; negative values and NaN are refused.
 uint64_t size_of(jdouble value) {
   if (!(value >= 0)) maq_jni::refuse("A size or a count is negative.");
   return value < 9e18 ? uint64_t(value) : UINT64_MAX;
@@ -63,8 +63,8 @@ maq_scene_build_config build_config(JNIEnv* env, const maq_jni::Bundle& bundle, 
   const std::vector<jdouble> from = numbers(env, values, 10);
   maq_scene_build_config config;
   check(maq_scene_build_config_init(&config, sizeof config));
-  bundle.put_into(config);
-  config.threads = int32_t(from[0]);
+  bundle.put_into(config.model);
+  config.model.threads = int32_t(from[0]);
   config.long_side_px = int32_t(from[1]);
   config.coefficient_bits = int32_t(from[2]);
   config.min_variation = from[3];
@@ -94,25 +94,30 @@ std::vector<jdouble> values_of(const maq_scene_build_stats& s) {
 
 }  // namespace
 
-// Writes the statistics to `stats`.
 MAQ_NATIVE_OF(NativeScene, jlong, build)
 (JNIEnv* env, jclass, jlong context, jlong capture, jbyteArray folder, jobjectArray names, jobjectArray buffers,
- jdoubleArray values, jobject progress, jdoubleArray stats) {
+ jdoubleArray values, jobject progress) {
   return call(env, [&] {
     const maq_jni::Bundle bundle(env, folder, names, buffers);
     const maq_scene_build_config config = build_config(env, bundle, values);
-    maq_scene_build_stats counted{};
-    counted.struct_size = sizeof counted;
     maq_scene* scene = nullptr;
     const ProgressOfCall told(env, progress);
     const maq_status status =
-        maq_scene_build(object<maq_context>(context), &config, object<maq_capture>(capture), &counted, &scene);
-    if (env->ExceptionCheck()) maq_scene_close(scene);
+        maq_scene_build(object<maq_context>(context), &config, object<maq_capture>(capture), &scene);
+    if (env->ExceptionCheck()) maq_scene_destroy(scene);
     maq_jni::check_pending(env);
     check(status);
-    const std::vector<jdouble> of_stats = values_of(counted);
-    env->SetDoubleArrayRegion(stats, 0, jsize(of_stats.size()), of_stats.data());
     return handle(scene);
+  });
+}
+
+// In the order of maq_scene_build_stats.
+MAQ_NATIVE_OF(NativeScene, jdoubleArray, buildStats)(JNIEnv* env, jclass, jlong scene) {
+  return call(env, [&] {
+    maq_scene_build_stats stats{};
+    stats.struct_size = sizeof stats;
+    check(maq_scene_get_build_stats(object<maq_scene>(scene), &stats));
+    return maq_jni::doubles_of(env, values_of(stats));
   });
 }
 

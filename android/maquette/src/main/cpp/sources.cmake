@@ -12,6 +12,7 @@ set(MAQ_JNI_SOURCES
   jni_head.cpp
   jni_head_building.cpp
   jni_head_rendering.cpp
+  jni_image.cpp
   jni_picture.cpp
   jni_pipeline.cpp
   jni_prediction.cpp

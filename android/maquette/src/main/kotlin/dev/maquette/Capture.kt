@@ -3,7 +3,7 @@ package dev.maquette
 import dev.maquette.jni.NativeScene
 
 /**
- * Posed photos of a place and a point cloud, in a folder. Made by [Maquette.openCapture]. Photos are read when they are
+ * Posed photos of an environment and a point cloud, in a folder. Made by [Maquette.openCapture]. Photos are read when they are
  * needed. All functions may be called from any thread.
  */
 class Capture internal constructor(context: Long, folder: String) : AutoCloseable {
@@ -31,7 +31,7 @@ class Capture internal constructor(context: Long, folder: String) : AutoCloseabl
     /** Up in the world: x, y, z of length 1. */
     val up: List<Double>
 
-    /** What of the capture cannot be used. */
+    /** Parts of the capture that cannot be used. */
     val drops: List<Drop>
 
     init {

@@ -10,12 +10,12 @@ import dev.maquette.jni.NativeHead
 class Head internal constructor(pointer: Long) : AutoCloseable {
     internal val handle = Handle(this, pointer, NativeHead::destroy)
 
-    /** Where the size of a head is from. */
+    /** Where the size of a head comes from. */
     enum class Scale {
-        /** Heads are that large on average: photos alone do not tell. */
+        /** The average of heads: photos alone do not tell the size. */
         PRIOR,
 
-        /** A distance that was known. */
+        /** A known distance. */
         GIVEN,
 
         /** A depth camera. */
@@ -23,7 +23,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * What a head has.
+     * A description of a head.
      *
      * @property photos that it was fitted to.
      * @property scaleSigma standard deviation of its size, as a fraction of it: 0.04 is 4 %; 0: not known.
@@ -32,14 +32,14 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     data class Info(val photos: Int, val scale: Scale, val scaleSigma: Double, val texturePx: Int)
 
     /**
-     * A place that has a name.
+     * A named point.
      *
-     * @property sigmaM standard deviation of each coordinate that the shape model and the photos leave: more where they do
-     *   not show it, or along their lines of sight; that of the size comes on top.
+     * @property sigmaM standard deviation of each coordinate, by shape model and photos. It is larger where no photo shows
+     *   the point, and along the lines of sight. The deviation of the size comes on top.
      */
     data class Landmark(val point: Point3, val sigmaM: Double)
 
-    /** What it has. */
+    /** Its description. */
     val info: Info
 
     /**
@@ -67,58 +67,39 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * The same head, of the size at which two of its [landmarks] are [distanceM] apart (0.001 to 10), such as pupil_left
-     * and pupil_right by what an optician measured.
+     * Copies the head with the size at which two of its [landmarks] are [distanceM] apart (0.001 to 10), such as pupil_left
+     * and pupil_right as an optician measured them.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also where both are the same place) and
-     *   [Status.NOT_FOUND] (it has no such place).
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also: both are the same point) and [Status.NOT_FOUND] (it
+     *   has no such landmark).
      */
     fun scaledByDistance(from: String, to: String, distanceM: Double): Head =
-        useMesh { head -> Head(NativeHead.scaleByDistance(head, from.toByteArray(), to.toByteArray(), distanceM)) }
+        handle.use { Head(NativeHead.scaleByDistance(it, from.toByteArray(), to.toByteArray(), distanceM)) }
 
     /**
-     * The same head, of the size at which it lies where a depth camera saw it. Takes some 100 ms, so not on the main thread.
+     * Copies the head with the size at which it fits a depth image. Takes some 100 ms, so not on the main thread.
      *
-     * @param depth of the same view as the photo with this camera, in any size: depth itself, or a picture that came with
-     *   depth. The photo should have been given its focal length: an estimated one that is 10 % too long makes the head as
-     *   much too small.
+     * @param depth of the view of the photo with this camera, in any size: a depth image, or an image with depth. Give that
+     *   photo its focal length: an estimate that is 10 % too long makes the head 10 % too small.
      * @param camera its index in [cameras].
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (the index, no depth, another shape than the photo's) and
-     *   [Status.NOT_FOUND] (half of the head has no depth that agrees with it).
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (the index, no depth, another aspect ratio than the
+     *   photo's) and [Status.NOT_FOUND] (half of the head has no depth that agrees with it).
      */
     fun scaledByDepth(depth: Frame, camera: Int = 0): Head =
-        useMesh { head -> depth.handle.use { frame -> Head(NativeHead.scaleByDepth(head, camera, frame)) } }
+        handle.use { head -> depth.handle.use { frame -> Head(NativeHead.scaleByDepth(head, camera, frame)) } }
 
     /**
-     * Makes its surface as a mesh, which stays when the head is closed. Takes a second or less with the defaults, so not on
-     * the main thread; the same again is quick.
+     * Makes a mesh of its surface, which stays when the head is closed. Takes a second or less with the defaults, so not on
+     * the main thread.
      *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (options), [Status.UNSUPPORTED] (it has no surface, or
-     *   the bundle no template), [Status.NOT_FOUND] and [Status.BAD_BUNDLE] (of the template's bundle),
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (the config), [Status.UNSUPPORTED] (the head has no surface,
+     *   or the bundle no template), [Status.NOT_FOUND] and [Status.BAD_BUNDLE] (the template's bundle),
      *   [Status.OUT_OF_MEMORY].
      */
-    fun mesh(options: HeadMeshOptions = HeadMeshOptions()): HeadMesh =
-        useMesh { head ->
-            val errorM = FloatArray(1)
-            val bundle = options.bundle
-            val arrays =
-                NativeHead.mesh(head, options.values(), bundle?.folder, bundle?.names, bundle?.buffers, errorM)
-            HeadMesh.of(arrays, errorM[0])
-        }
-
-    /**
-     * Writes its mesh for other programs, by the ending of [path]: .glb, .obj with a .mtl beside it, or .ply; the first two
-     * with the texture, the first with morph targets. In files x is to the person's left, y up, z to the front. Files
-     * appear atomically, in a folder that exists. Blocks while the mesh is made and written.
-     *
-     * @throws MaquetteException as [mesh], and with [Status.INVALID_ARGUMENT] (another ending) and [Status.UNWRITABLE].
-     */
-    fun export(path: String, options: HeadMeshOptions = HeadMeshOptions()) =
-        useMesh { head ->
-            val bundle = options.bundle
-            NativeHead.exportMesh(
-                head, path.toByteArray(), options.values(), bundle?.folder, bundle?.names, bundle?.buffers,
-            )
+    fun mesh(config: HeadMesh.Config = HeadMesh.Config()): HeadMesh =
+        handle.use { head ->
+            val bundle = config.bundle
+            HeadMesh(NativeHead.createMesh(head, config.values(), bundle?.folder, bundle?.names, bundle?.buffers))
         }
 
     /**
@@ -129,9 +110,6 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
      */
     fun save(path: String) = handle.use { NativeHead.save(it, path.toByteArray()) }
 
-    /** For what makes or uses the mesh that native code keeps: one at a time, since another one replaces it. */
-    internal fun <T> useMesh(work: (Long) -> T): T = handle.use { synchronized(handle) { work(it) } }
-
-    /** Meshes and renderers of it stay usable. */
+    /** Its meshes and their renderers stay usable. */
     override fun close() = handle.close()
 }

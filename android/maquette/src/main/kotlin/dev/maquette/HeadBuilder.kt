@@ -2,25 +2,17 @@ package dev.maquette
 
 import dev.maquette.jni.NativeHead
 
-/** Told how far a fit has come, on the thread that fits, which waits meanwhile. */
-fun interface HeadProgress {
-    /**
-     * @param done the fraction that is done, 0 to 1.
-     * @return false to cancel.
-     */
-    fun onProgress(done: Double): Boolean
-}
-
-/** Gets the head as far as it is fitted, on the thread that fits, which waits meanwhile. */
+/** Receives the head as far as it is fitted, on the thread that fits, which waits meanwhile. */
 fun interface HeadPreview {
     /** @param head the preview's, to be closed by it. */
     fun onPreview(head: Head)
 }
 
 /** Called by native code, by its names. */
-internal class HeadCallbacks(private val progress: HeadProgress?, private val preview: HeadPreview?) {
+internal class HeadCallbacks(private val progress: Progress?, private val preview: HeadPreview?) {
     @Suppress("unused")
-    fun onProgress(done: Double): Boolean = progress?.onProgress(done) ?: true
+    fun onProgress(done: Double, stage: ByteArray): Boolean =
+        progress?.onProgress(done, stage.decodeToString()) ?: true
 
     @Suppress("unused")
     fun onPreview(head: Long) {
@@ -28,7 +20,7 @@ internal class HeadCallbacks(private val progress: HeadProgress?, private val pr
     }
 }
 
-/** Where a head is, with its hair: edges in pixels of the photo, the right and the bottom one exclusive. */
+/** The box of a head with its hair, in pixels of the photo; right and bottom are exclusive. */
 data class HeadBox(val left: Float, val top: Float, val right: Float, val bottom: Float)
 
 /**
@@ -36,10 +28,10 @@ data class HeadBox(val left: Float, val top: Float, val right: Float, val bottom
  *
  * ```
  * builder.addPhoto(frame)
- * builder.fit(3.0) { done -> show(done); isActive }.use { head -> head.export(path) }
+ * builder.fit(3.0) { done, _ -> show(done); isActive }.use { head -> head.mesh().use { it.save(path) } }
  * ```
  *
- * A face is biometric data: ask the person, and keep heads as you would keep passwords. The part of each photo around the
+ * A face is biometric data: ask the person, and protect heads like passwords. The part of each photo around the
  * head stays in memory until [clear] or [close].
  *
  * Functions may be called from any thread, one at a time but for [cancel]; they take long, so not on the main thread.
@@ -47,48 +39,61 @@ data class HeadBox(val left: Float, val top: Float, val right: Float, val bottom
 class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, NativeHead::destroyBuilder)
 
+    /** Whether heads get a texture. */
+    enum class Texture {
+        /** The SDK's choice: [OFF] in this version. */
+        DEFAULT,
+
+        /** Heads have colours of the network alone, and hold no part of a photo. */
+        OFF,
+
+        /** The photos' pixels where they see the surface well, the network's colours elsewhere. */
+        ON,
+    }
+
     /**
      * @property threads as of [DensePose.Config], for the network and the fit.
-     * @property texturePx pixels a side of the texture that heads get, 256 to 2048: the photos' pixels where they see the
-     *   surface well. With 1024 a fit takes 140 MB of memory more. 0: they have none, and hold no part of a photo.
-     * @property isTextureMirrored what no photo sees of one side looks like the other.
      * @property allowSpinning as of [DensePose.Config].
      * @property provider as of [DensePose.Config].
-     * @property isTextureUnlit the photos' light from one side is taken out of the texture, as far as it can be told from
-     *   the colours, so that an app can light the head anew.
+     * @property texture with 1024 pixels a fit takes 140 MB of memory more.
+     * @property texturePx pixels a side, 256 to 2048; 0: 1024. Only with [Texture.ON].
+     * @property mirrorUnseen if no photo sees one side of the head, the texture of the other side is mirrored.
+     * @property delightTexture directional light of the photos is removed from the texture, as far as the colours tell it,
+     *   so that an app can relight the head.
      */
     data class Config(
         val threads: Int = 0,
-        val texturePx: Int = 0,
-        val isTextureMirrored: Boolean = false,
         val allowSpinning: Boolean = false,
         val provider: DensePose.Provider = DensePose.Provider.CPU,
-        val isTextureUnlit: Boolean = false,
+        val texture: Texture = Texture.DEFAULT,
+        val texturePx: Int = 0,
+        val mirrorUnseen: Boolean = false,
+        val delightTexture: Boolean = false,
     ) {
         internal fun values() =
             doubleArrayOf(
                 threads.toDouble(),
-                texturePx.toDouble(),
-                if (isTextureMirrored) 1.0 else 0.0,
                 if (allowSpinning) 1.0 else 0.0,
                 provider.ordinal.toDouble(),
-                if (isTextureUnlit) 1.0 else 0.0,
+                texture.ordinal.toDouble(),
+                texturePx.toDouble(),
+                if (mirrorUnseen) 1.0 else 0.0,
+                if (delightTexture) 1.0 else 0.0,
             )
     }
 
     /**
-     * What was found of a photo. The last three are of the latest [fit], and false or 0 before.
+     * What was found in a photo. The last three describe the latest [fit], and are false or 0 before.
      *
-     * @property box in which the head was seen: given, or found.
-     * @property headFraction how much of the box's surroundings the network sees as head, 0 to 1.
-     * @property isUsed whether the head was fitted to it. A photo without a head, or with another one than the other
-     *   photos, is left out.
+     * @property box of the head: given, or detected.
+     * @property headCoverage fraction of the encoder's crop that shows the head, 0 to 1.
+     * @property isUsed whether the head was fitted to it. Photos without a head or of a different person are rejected.
      * @property focalPx of the camera, given or estimated, in pixels of the photo.
-     * @property rmsPx root mean square distance of points of the head from where the network saw them.
+     * @property rmsPx root mean square distance of head points from where the network saw them.
      */
     data class Photo(
         val box: HeadBox,
-        val headFraction: Float,
+        val headCoverage: Float,
         val isUsed: Boolean,
         val focalPx: Float,
         val rmsPx: Float,
@@ -98,8 +103,8 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      * Wall-clock milliseconds, and counts, of the photos so far and of the latest [fit].
      *
      * @property encodeMs the network, over all photos.
-     * @property poseMs cameras and a first shape, from what the network saw.
-     * @property fitMs the head fitted to the pixels, in [steps].
+     * @property poseMs cameras and a first shape, from the network's output.
+     * @property fitMs the fit of the head to the pixels, in [steps].
      * @property totalMs of the fit.
      */
     data class Stats(
@@ -114,7 +119,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         val threads: Int,
     )
 
-    /** What was found of each photo, in the order they were added. */
+    /** What was found in each photo, in the order of [addPhoto]. */
     val photos: List<Photo>
         get() =
             handle.use { builder ->
@@ -135,13 +140,12 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         }
 
     /**
-     * Looks at a photo of the head, of any format but depth, which may be closed afterwards. Several must be of one
+     * Encodes a photo of the head, of any format but depth, which may be closed afterwards. Several must be of one
      * person; each may have its own camera, without lens distortion. When it fails, the builder stays as it was.
      *
      * @param box of the head, which may reach beyond the photo ([DensePoseResult.headBox]); null: it is looked for, which
      *   takes longer, and finds it where it is alone in the photo and not small.
-     * @param rollRad how far the head is turned in the photo's plane, clockwise from upright; it need be right to some
-     *   30 degrees.
+     * @param rollRad rotation of the head in the photo's plane, clockwise from upright; exact to some 30 degrees is enough.
      * @param focalPx of the camera, in pixels of this photo; null: it is estimated.
      * @throws MaquetteException with [Status.NOT_FOUND] (there is no head), [Status.INVALID_ARGUMENT] (a box that is
      *   empty or outside of the photo, a focal length that is not positive, more than 64 photos), [Status.UNSUPPORTED] (a
@@ -153,8 +157,8 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         rollRad: Float = 0f,
         focalPx: Float? = null,
     ) {
-        // To the C API zeros are what is not known.
-        require(box != HeadBox(0f, 0f, 0f, 0f)) { "The box is empty; give the head's, or null to look for it." }
+        // For the C API zeros mean unknown.
+        require(box != HeadBox(0f, 0f, 0f, 0f)) { "The box is empty; give the head's, or null to detect it." }
         require(focalPx != 0f) { "The focal length is 0; give the camera's, or null to have it estimated." }
         val (left, top, right, bottom) = box ?: HeadBox(0f, 0f, 0f, 0f)
         val hints = floatArrayOf(left, top, right, bottom, rollRad, focalPx ?: 0f)
@@ -162,27 +166,25 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * Adds the photos of this builder to those that [head] was fitted to, which are not needed: later fits go on from what
-     * they said. It must be of the same person; another takes its place. Its cameras come first in the head that is
-     * fitted, and a size that was known stays.
+     * Uses [head] as prior for later fits, so that its photos are not needed again. It must show the same person; another
+     * call replaces it. Its cameras come first in the fitted head, and a known size stays.
      *
-     * @throws MaquetteException with [Status.UNSUPPORTED] (a head of another bundle, or from a file of
-     *   version 1), [Status.INVALID_ARGUMENT] (more than 192 photos).
+     * @throws MaquetteException with [Status.UNSUPPORTED] (a head of another bundle, or from a file of version 1),
+     *   [Status.INVALID_ARGUMENT] (more than 192 photos).
      */
     fun addHead(head: Head) = handle.use { builder -> head.handle.use { NativeHead.addHead(builder, it) } }
 
-    /** Forgets the photos, and the head that they would be added to, for a head of another person. */
+    /** Forgets the photos and the prior head, so that another person's head can be fitted. */
     fun clear() = handle.use(NativeHead::clear)
 
     /**
-     * Fits one head to the photos so far: cameras and a first shape in milliseconds, which is the head where [seconds] is
-     * 0; then shape and colours to the pixels, for up to [seconds] or until that gains no more. More photos may be added
-     * afterwards and all be fitted again.
+     * Fits one head to the photos so far. The first stage finds cameras and a shape in milliseconds; with [seconds] 0 that
+     * is the result. The second stage fits shape and colours to the pixels, for up to [seconds] or until it converges. More
+     * photos may be added afterwards and all be fitted again.
      *
-     * @param preview gets the head that the network saw, then, every [previewIntervalS] seconds, what there is of it;
-     *   not where [seconds] is 0. What it throws cancels, and is thrown. It must not use this builder.
-     * @param progress may cancel; what it throws cancels too, and is thrown. It must not use this builder, but for
-     *   [cancel].
+     * @param preview receives the head so far, first the network's head, then every [previewIntervalS] seconds; not with
+     *   [seconds] 0. Its exceptions cancel, and are thrown. It must not use this builder, except [cancel].
+     * @param progress may cancel; its exceptions cancel too, and are thrown. It must not use this builder, except [cancel].
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (no photos, times out of 0 to 3600),
      *   [Status.NOT_FOUND] (no photo shows a head), [Status.CANCELLED].
      */
@@ -190,7 +192,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         seconds: Double = 3.0,
         previewIntervalS: Double = 1.0,
         preview: HeadPreview? = null,
-        progress: HeadProgress? = null,
+        progress: Progress? = null,
     ): Head =
         handle.use { builder ->
             Head(
@@ -198,9 +200,9 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
             )
         }
 
-    /** Ends the [addPhoto] or [fit] that runs, or else the next; from any thread. Does not block. */
+    /** Ends the running [addPhoto] or [fit], or else the next one; from any thread. Does not block. */
     fun cancel() = handle.use(NativeHead::cancel)
 
-    /** Heads that it made stay valid. */
+    /** Its heads stay valid. */
     override fun close() = handle.close()
 }

@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.NativeHead
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 import java.nio.FloatBuffer
@@ -7,75 +8,106 @@ import java.nio.IntBuffer
 
 /** Which vertices and triangles the mesh of a head has. */
 enum class HeadTopology {
-    /** Those of the surface as it is, closed. */
+    /** The surface itself, closed. */
     FIELD,
 
     /**
-     * Those of the template head, the same for every head, with texture coordinates, eyeballs, teeth and tongue, and morph
-     * targets for facial actions; open at the neck. Hair, beards and glasses are as coarse as the skin is.
+     * The template head, registered to the surface: the same vertices for every head, with texture coordinates, eyeballs,
+     * teeth, tongue, and morph targets for facial actions. It is open at the neck; hair, beards and glasses are as coarse
+     * as skin.
      */
     TEMPLATE,
 }
 
 /**
- * How fine the mesh of a head is, and of which vertices.
+ * The surface of a head. It ends below the chin, and is closed except with [HeadTopology.TEMPLATE]. Made by [Head.mesh].
  *
- * @property triangleCount about as many, 100 or more; 0: 60,000, or with a [cellM] all; [ALL_TRIANGLES]: all.
- * @property cellM distance of neighbouring vertices of the full mesh, about, 0.0005 to 0.02 metres; 0: 0.0016, or 0.0021
- *     where no more than 60,000 triangles are to be left.
- * @property topology with [HeadTopology.TEMPLATE], [triangleCount] and [cellM] must be 0.
- * @property bundle networks of heads, whose template it is, for [HeadTopology.TEMPLATE] of a head that was opened: there is
- *   none in its file. A head that was fitted, or has got a template, keeps its own.
+ * Arrays are copied at the first use and stay valid after [close]. Buffers are direct and read-only, in native byte order,
+ * each time with their own position: they can be given to OpenGL. Where there are texture coordinates, vertices at seams
+ * appear twice.
  */
-data class HeadMeshOptions(
-    val triangleCount: Int = 0,
-    val cellM: Double = 0.0,
-    val topology: HeadTopology = HeadTopology.FIELD,
-    val bundle: ModelBundle? = null,
-) {
-    init {
-        require(triangleCount >= ALL_TRIANGLES) { "The mesh has $triangleCount triangles; it needs 100 or more." }
-    }
+class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
+    internal val handle = Handle(this, pointer, NativeHead::destroyMesh)
 
-    internal fun values() = doubleArrayOf(triangleCount.toDouble(), cellM, topology.ordinal.toDouble())
-
-    companion object {
-        /** For [triangleCount]. */
-        const val ALL_TRIANGLES = -1
-    }
-}
-
-/**
- * The surface of a head, cut off below the chin, and closed but for [HeadTopology.TEMPLATE]. Made by [Head.mesh].
- *
- * Buffers are direct and read-only, in native byte order, each time with a position of their own: they can be given to
- * OpenGL as they are. Where there are texture coordinates, vertices at seams are there twice.
- *
- * @property simplificationErrorM the largest distance of a vertex of the full mesh from this one; 0 where it is full.
- * @property textureJpeg a JPEG file, square, for `BitmapFactory`; null where the head has no texture, and with
- *   [HeadTopology.TEMPLATE], whose coordinates are not of it.
- * @property morphTargets facial actions, with [HeadTopology.TEMPLATE]; else there are none.
- */
-class HeadMesh private constructor(
-    private val floats: List<ByteBuffer?>,
-    private val colourBytes: ByteBuffer,
-    private val indices: ByteBuffer,
-    val simplificationErrorM: Float,
-    val textureJpeg: ByteArray?,
-    val morphTargets: List<MorphTarget>,
-) {
     /**
-     * How vertices move in a facial action at its strongest: to position + weight * move, with weights of 0 to 1, and the
-     * sum of the moves where there are several actions.
+     * How fine a mesh is, and which vertices it has. 0 means the default.
      *
-     * @property name one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's.
-     * @property vertices those that move, in increasing order.
-     * @property movesM x, y, z of each of them, in metres.
+     * @property triangleCount about this many, 100 or more; 0: 60,000, or all if [cellM] is set; [ALL_TRIANGLES]: all.
+     * @property cellM distance between neighbouring vertices of the full mesh, about, 0.0005 to 0.02 metres; 0: 0.0021, or
+     *   0.0016 for more than 60,000 triangles.
+     * @property topology with [HeadTopology.TEMPLATE], [triangleCount] and [cellM] must be 0.
+     * @property bundle networks of heads with the template, for [HeadTopology.TEMPLATE] of an opened head: its file has no
+     *   template. A fitted head keeps the template of its builder.
      */
-    class MorphTarget internal constructor(val name: String, val vertices: IntArray, val movesM: FloatArray)
+    data class Config(
+        val triangleCount: Int = 0,
+        val cellM: Double = 0.0,
+        val topology: HeadTopology = HeadTopology.FIELD,
+        val bundle: ModelBundle? = null,
+    ) {
+        init {
+            require(triangleCount >= ALL_TRIANGLES) { "The mesh has $triangleCount triangles; it needs 100 or more." }
+        }
 
-    val vertexCount: Int = colourBytes.capacity() / 3
-    val triangleCount: Int = indices.capacity() / (3 * Int.SIZE_BYTES)
+        internal fun values() = doubleArrayOf(triangleCount.toDouble(), cellM, topology.ordinal.toDouble())
+
+        companion object {
+            /** For [triangleCount]. */
+            const val ALL_TRIANGLES = -1
+        }
+    }
+
+    /**
+     * A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The deltas of
+     * several actions add up.
+     *
+     * @property name one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's left.
+     * @property vertices the vertices that move, in increasing order.
+     * @property deltasM x, y, z of each of them, in metres.
+     */
+    class MorphTarget internal constructor(val name: String, val vertices: IntArray, val deltasM: FloatArray)
+
+    private class Arrays(
+        val floats: List<ByteBuffer?>,
+        val colours: ByteBuffer,
+        val triangles: ByteBuffer,
+        val textureJpeg: ByteArray?,
+        val morphTargets: List<MorphTarget>,
+        val simplificationErrorM: Float,
+    )
+
+    private val arrays: Arrays by lazy {
+        val errorM = FloatArray(1)
+        val all = handle.use { NativeHead.meshArrays(it, errorM) }
+        val (positions, normals, colours, templatePoints, triangles) = all
+        val (coordinates, texture, targets) = all.drop(5)
+        Arrays(
+            listOf(positions, normals, templatePoints, coordinates).map { it as ByteBuffer? },
+            colours as ByteBuffer,
+            triangles as ByteBuffer,
+            texture as ByteArray?,
+            (targets as Array<*>).map { target ->
+                val (name, vertices, deltas) = target as Array<*>
+                MorphTarget((name as ByteArray).decodeToString(), vertices as IntArray, deltas as FloatArray)
+            },
+            errorM[0],
+        )
+    }
+
+    val vertexCount: Int get() = arrays.colours.capacity() / 3
+    val triangleCount: Int get() = arrays.triangles.capacity() / (3 * Int.SIZE_BYTES)
+
+    /** The largest distance of a vertex of the full mesh from this one; 0 if nothing was removed. */
+    val simplificationErrorM: Float get() = arrays.simplificationErrorM
+
+    /**
+     * A square JPEG file, for `BitmapFactory`; null if the head has no texture, and with [HeadTopology.TEMPLATE], which has
+     * another layout.
+     */
+    val textureJpeg: ByteArray? get() = arrays.textureJpeg
+
+    /** Facial actions, with [HeadTopology.TEMPLATE]; else none. */
+    val morphTargets: List<MorphTarget> get() = arrays.morphTargets
 
     /** x, y, z of each vertex, in metres. */
     val positions: FloatBuffer get() = floats(0)!!
@@ -84,39 +116,32 @@ class HeadMesh private constructor(
     val normals: FloatBuffer get() = floats(1)!!
 
     /**
-     * x, y, z of each vertex, in metres: where it lies on the template head, which is the same place (the tip of the nose,
-     * say) on every head.
+     * x, y, z of each vertex, in metres: its point of the template head. Equal points mean the same part of every head, such
+     * as the tip of the nose.
      */
     val templatePoints: FloatBuffer get() = floats(2)!!
 
-    /** u to the right and v down of each vertex, 0 to 1; null without texture, but for [HeadTopology.TEMPLATE]. */
+    /** u to the right and v down of each vertex, 0 to 1; null without a texture, except with [HeadTopology.TEMPLATE]. */
     val textureCoordinates: FloatBuffer? get() = floats(3)
 
     /** Red, green, blue of each vertex, sRGB. */
-    val colours: ByteBuffer get() = colourBytes.asReadOnlyBuffer()
+    val colours: ByteBuffer get() = arrays.colours.asReadOnlyBuffer()
 
     /** Three vertices of each triangle, counter-clockwise seen from outside. */
-    val triangles: IntBuffer get() = indices.asReadOnlyBuffer().order(ByteOrder.nativeOrder()).asIntBuffer()
+    val triangles: IntBuffer get() = arrays.triangles.asReadOnlyBuffer().order(ByteOrder.nativeOrder()).asIntBuffer()
 
     private fun floats(index: Int): FloatBuffer? =
-        floats[index]?.asReadOnlyBuffer()?.order(ByteOrder.nativeOrder())?.asFloatBuffer()
+        arrays.floats[index]?.asReadOnlyBuffer()?.order(ByteOrder.nativeOrder())?.asFloatBuffer()
 
-    internal companion object {
-        /** From what NativeHead.mesh gives. */
-        fun of(arrays: Array<Any?>, simplificationErrorM: Float): HeadMesh {
-            val (positions, normals, colours, templatePoints, triangles) = arrays
-            val (coordinates, texture, targets) = arrays.drop(5)
-            return HeadMesh(
-                listOf(positions, normals, templatePoints, coordinates).map { it as ByteBuffer? },
-                colours as ByteBuffer,
-                triangles as ByteBuffer,
-                simplificationErrorM,
-                texture as ByteArray?,
-                (targets as Array<*>).map { target ->
-                    val (name, vertices, moves) = target as Array<*>
-                    MorphTarget((name as ByteArray).decodeToString(), vertices as IntArray, moves as FloatArray)
-                },
-            )
-        }
-    }
+    /**
+     * Writes the mesh for other programs. The extension of [path] chooses the format: .glb, .obj with a .mtl beside it, or
+     * .ply. GLB and OBJ have the texture, GLB also the morph targets. In files x is to the person's left, y up, z to the
+     * front. Files appear atomically, in a folder that exists. Blocks while they are written.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension) and [Status.UNWRITABLE].
+     */
+    fun save(path: String) = handle.use { NativeHead.saveMesh(it, path.toByteArray()) }
+
+    /** Its renderers stay usable. */
+    override fun close() = handle.close()
 }

@@ -308,7 +308,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         capture: Capture,
         bundle: ModelBundle,
         config: SceneBuildConfig = SceneBuildConfig(),
-        progress: SceneProgress? = null,
+        progress: Progress? = null,
     ): Scene = handle.use { context -> Scene.build(context, capture, bundle, config, progress) }
 
     /**
@@ -389,12 +389,12 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     fun openHead(assets: AssetManager, path: String): Head = openHead(ModelBundle.mappedOrRead(assets, path))
 
     /**
-     * A renderer of a head; makes its mesh, which takes a second or less with the defaults, so not on the main thread.
+     * Creates a renderer of a head's mesh.
      *
-     * @throws MaquetteException as [Head.mesh].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (the config).
      */
-    fun headRenderer(head: Head, config: HeadRenderer.Config = HeadRenderer.Config()): HeadRenderer =
-        handle.use { context -> HeadRenderer(context, head, config) }
+    fun headRenderer(mesh: HeadMesh, config: HeadRenderer.Config = HeadRenderer.Config()): HeadRenderer =
+        handle.use { context -> HeadRenderer(context, mesh, config) }
 
     override fun close() = handle.close()
 

@@ -3,7 +3,7 @@ package dev.maquette
 import dev.maquette.jni.NativeScene
 
 /**
- * A place that can be seen from new viewpoints with a [SceneRenderer]. Made by [Maquette.buildScene],
+ * An environment that can be seen from new viewpoints with a [SceneRenderer]. Made by [Maquette.buildScene],
  * [SceneBuilder.finish] and [Maquette.openScene]. All functions may be called from any thread.
  *
  * @property buildStats how it was built; null if it was opened.
@@ -12,7 +12,7 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
     internal val handle = Handle(this, pointer, NativeScene::close)
 
     /**
-     * What a scene has.
+     * A description of a scene.
      *
      * @property coefficientBits of its descriptors: 8, 16 or 32.
      * @property viewDependentPoints points whose descriptors depend on the viewing direction.
@@ -32,7 +32,7 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
         val networksSha256: String,
     )
 
-    /** What it has. */
+    /** Its description. */
     val info: Info =
         handle.use { scene ->
             val networks = ByteArray(32)
@@ -54,7 +54,7 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
     /** Writes positions and mean colours as a binary PLY file, for other programs; fails as [save]. */
     fun savePly(path: String) = handle.use { NativeScene.savePly(it, path.toByteArray()) }
 
-    /** Renderers of it stay usable. */
+    /** Its renderers stay usable. */
     override fun close() = handle.close()
 
     internal companion object {
@@ -63,9 +63,8 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
             capture: Capture,
             bundle: ModelBundle,
             config: SceneBuildConfig,
-            progress: SceneProgress?,
+            progress: Progress?,
         ): Scene {
-            val stats = DoubleArray(SceneBuildStats.COUNT)
             val scene =
                 capture.handle.use {
                     NativeScene.build(
@@ -75,11 +74,10 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
                         bundle.names,
                         bundle.buffers,
                         config.values(),
-                        progress?.let(::Progress),
-                        stats,
+                        progress?.let(::NativeProgress),
                     )
                 }
-            return Scene(scene, SceneBuildStats.of(stats))
+            return Scene(scene, SceneBuildStats.of(NativeScene.buildStats(scene)))
         }
     }
 }

@@ -4,45 +4,29 @@ import dev.maquette.jni.NativeScene
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 
-/** Told how far building has come, on the thread that builds, which waits meanwhile. */
-fun interface SceneProgress {
-    /**
-     * @param done the fraction that is done, 0 to 1.
-     * @param stage what is done now, in a sentence.
-     * @return false to cancel.
-     */
-    fun onProgress(done: Double, stage: String): Boolean
-}
-
-/** Called by native code, by its name. */
-internal class Progress(private val progress: SceneProgress) {
-    @Suppress("unused")
-    fun onProgress(done: Double, stage: ByteArray): Boolean = progress.onProgress(done, stage.decodeToString())
-}
-
 /**
- * How scenes are built. Lengths are in units of the scene.
+ * How scenes are built. Lengths are in units of the scene. 0 means the default.
  *
  * @property threads 0: the large cores, at most 4.
- * @property longSidePx larger photos are scaled down to this long side; 0: they are not scaled.
- * @property coefficientBits of the scene's descriptors: 8, 16, or 32 (floats, positions then too).
- * @property minVariation points whose descriptors vary less between photos (RMS, for colours of 0 to 1) are stored
- *   without view dependence, which makes the file smaller; 0: all points are view-dependent; negative: 0.05, and with 8
- *   bits a larger value if needed, so that at most half of the points are.
- * @property visibilityScale fraction of a photo's resolution at which visibility is tested, 1/16 to 1. With a smaller
- *   one each point hides more of what is behind it; use it for sparse clouds.
- * @property nearDepth points nearer to a camera, along its axis, are not seen by it.
+ * @property longSidePx larger photos are scaled down to this long side; 0: 640; [LONG_SIDE_FULL]: never.
+ * @property coefficientBits of each number of a descriptor: 8, 16, or 32 (floats, then also positions); 0: 8.
+ * @property minVariation points whose descriptors vary less between photos are stored without view dependence; RMS, for
+ *   colours of 0 to 1. 0: 0.05, or with 8 bits the value at which half of the points are view-dependent, if that is
+ *   larger. [VARIATION_ALL]: all points are view-dependent.
+ * @property visibilityScale fraction of a photo's resolution at which visibility is tested, 1/16 to 1; 0: 1. A smaller
+ *   fraction lets each point hide more of what is behind it; use it for sparse clouds.
+ * @property nearDepth a camera does not see points nearer than this along its axis.
  * @property maxPoints larger clouds are thinned out evenly; 0: no limit.
- * @property maxMemoryBytes for the fitting of descriptors; 0: 2 GiB.
- * @property maxViews of a capture: if there are more photos, an even selection is used; 0: no limit.
- * @property useHeldOut of a capture: also photos that it holds out for comparison.
+ * @property maxMemoryBytes memory for the descriptors; 0: 2 GiB.
+ * @property maxViews for captures: of more photos an even selection is used; 0: no limit.
+ * @property useHeldOut for captures: also use photos that the capture holds out for comparison.
  */
 data class SceneBuildConfig(
     val threads: Int = 0,
-    val longSidePx: Int = 640,
-    val coefficientBits: Int = 8,
-    val minVariation: Double = -1.0,
-    val visibilityScale: Double = 1.0,
+    val longSidePx: Int = 0,
+    val coefficientBits: Int = 0,
+    val minVariation: Double = 0.0,
+    val visibilityScale: Double = 0.0,
     val nearDepth: Double = 0.0,
     val maxPoints: Long = 0,
     val maxMemoryBytes: Long = 0,
@@ -62,6 +46,14 @@ data class SceneBuildConfig(
             maxViews.toDouble(),
             if (useHeldOut) 1.0 else 0.0,
         )
+
+    companion object {
+        /** For [longSidePx]: photos are not scaled. */
+        const val LONG_SIDE_FULL = -1
+
+        /** For [minVariation]: all points are view-dependent. */
+        const val VARIATION_ALL = -1.0
+    }
 }
 
 /**
@@ -86,8 +78,6 @@ data class SceneBuildStats(
     val packMs: Double,
 ) {
     internal companion object {
-        const val COUNT = 11
-
         fun of(s: DoubleArray) =
             SceneBuildStats(
                 s[0].toInt(), s[1].toInt(), s[2].toLong(), s[3].toLong(), s[4], s[5], s[6], s[7], s[8], s[9], s[10],
@@ -173,10 +163,10 @@ class SceneBuilder internal constructor(
     fun addView(
         photo: Frame,
         camera: PinholeCamera,
-        progress: SceneProgress? = null,
+        progress: Progress? = null,
     ): Long =
         handle.use { builder ->
-            photo.handle.use { NativeScene.addView(builder, it, camera.values(), progress?.let(::Progress)) }
+            photo.handle.use { NativeScene.addView(builder, it, camera.values(), progress?.let(::NativeProgress)) }
         }
 
     /** Cancels the [addView] that runs, or else the next; from any thread. Does not block. */
@@ -189,7 +179,7 @@ class SceneBuilder internal constructor(
      */
     fun finish(): Scene {
         val scene = handle.use(NativeScene::finishBuilder)
-        return Scene(scene, stats)
+        return Scene(scene, SceneBuildStats.of(NativeScene.buildStats(scene)))
     }
 
     /** Scenes that it finished stay valid. */

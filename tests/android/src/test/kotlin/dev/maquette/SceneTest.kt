@@ -91,16 +91,16 @@ class SceneTest : AndroidTest() {
                 scene.close()
                 renderer.run(smaller(capture.views[0].camera, by = 4)).use { image ->
                     assertEquals(160 to 120, image.widthPx to image.heightPx)
-                    assertTrue(image.stats.totalMs > 0 && image.stats.shadedPoints > 1000)
-                    val alpha = image.plane(SceneImage.Plane.ALPHA)
+                    assertTrue(image.sceneStats.totalMs > 0 && image.sceneStats.shadedPoints > 1000)
+                    val alpha = image.plane(RenderedImage.Plane.ALPHA)
                     assertEquals(160 * 120, alpha.capacity())
                     assertTrue(alpha.isReadOnly)
-                    val depth = image.plane(SceneImage.Plane.DEPTH).asFloatBuffer()
+                    val depth = image.plane(RenderedImage.Plane.DEPTH).asFloatBuffer()
                     assertTrue((0 until depth.capacity()).count { depth[it] > 0 } > 160 * 120 / 2)
 
                     val picture = image.toBitmap()
                     val expected = capture.loadView(0).use { it.resize(160, 120).use(Frame::bgr) }
-                    val bgr = image.plane(SceneImage.Plane.BGR)
+                    val bgr = image.plane(RenderedImage.Plane.BGR)
                     var difference = 0
                     for (k in 0 until 160 * 120) {
                         val pixel = picture.getPixel(k % 160, k / 160)
@@ -134,7 +134,7 @@ class SceneTest : AndroidTest() {
                         image.save(File(folder, "view.png").path, withAlpha = true)
                         failure(Status.INVALID_ARGUMENT) { image.save(File(folder, "view.gif").path) }
                         val bgr = ByteArray(3 * 64 * 48)
-                        image.plane(SceneImage.Plane.BGR).get(bgr)
+                        image.plane(RenderedImage.Plane.BGR).get(bgr)
                         bgr.toList()
                     }
                 }
@@ -246,7 +246,7 @@ class SceneTest : AndroidTest() {
             SceneBuildConfig(coefficientBits = 7),
             SceneBuildConfig(maxPoints = -1),
             SceneBuildConfig(visibilityScale = Double.NaN),
-            SceneBuildConfig(longSidePx = -1),
+            SceneBuildConfig(longSidePx = -2),
         )) {
             failure(Status.INVALID_ARGUMENT) { maquette.sceneBuilder(ball(10), bundle, config) }
         }
@@ -285,11 +285,11 @@ class SceneTest : AndroidTest() {
         failure(Status.POOL_EMPTY) { renderer.run(cameraAt(0.0)) }
         renderer.close()
         assertClosed { renderer.run(cameraAt(0.0)) }
-        assertEquals(0, image.plane(SceneImage.Plane.ALPHA)[0].toInt())
+        assertEquals(0, image.plane(RenderedImage.Plane.ALPHA)[0].toInt())
         assertEquals("the background", 0x102030, image.toBitmap().getPixel(0, 0) and 0xFFFFFF)
         image.close()
         image.close()
-        assertClosed { image.plane(SceneImage.Plane.BGR) }
+        assertClosed { image.plane(RenderedImage.Plane.BGR) }
         assertClosed { image.toBitmap() }
         assertEquals(640, view.widthPx)
         view.close()
@@ -320,7 +320,7 @@ class SceneTest : AndroidTest() {
                 try {
                     // Every other image is forgotten.
                     val image = renderer.run(cameraAt(0.1 * images))
-                    assertEquals(64 * 48, image.plane(SceneImage.Plane.ALPHA).capacity())
+                    assertEquals(64 * 48, image.plane(RenderedImage.Plane.ALPHA).capacity())
                     if (++images % 2 == 0) image.close()
                 } catch (error: MaquetteException) {
                     assertEquals(error.message, Status.POOL_EMPTY, error.status)

@@ -3,7 +3,7 @@ package dev.maquette.jni
 import dev.maquette.HeadCallbacks
 import java.nio.ByteBuffer
 
-/** The C API's heads, as [Native]. `meshOptions` as in HeadMeshOptions. */
+/** The C API's heads, as [Native]. */
 internal object NativeHead {
     init {
         System.loadLibrary("maquette_jni")
@@ -20,7 +20,7 @@ internal object NativeHead {
 
     @JvmStatic external fun destroyBuilder(builder: Long)
 
-    /** [hints]: left, top, right and bottom of the box, roll, focal length; 0 where they are not known. */
+    /** [hints]: left, top, right and bottom of the box, roll, focal length; 0 if unknown. */
     @JvmStatic external fun addPhoto(builder: Long, photo: Long, hints: FloatArray)
 
     @JvmStatic external fun addHead(builder: Long, head: Long)
@@ -51,41 +51,25 @@ internal object NativeHead {
     @JvmStatic external fun landmark(head: Long, name: ByteArray): DoubleArray
     @JvmStatic external fun camera(head: Long, index: Int): DoubleArray
 
-    /**
-     * Direct buffers with positions, normals, colours, template points, triangles and texture coordinates (or null); the
-     * texture's file (or null); of each morph target name, vertices and moves. Writes the simplification error.
-     */
     @JvmStatic
-    external fun mesh(
-        head: Long,
-        meshOptions: DoubleArray,
-        folder: ByteArray?,
-        names: Array<ByteArray>?,
-        buffers: Array<ByteBuffer>?,
-        errorM: FloatArray,
-    ): Array<Any?>
-
-    @JvmStatic
-    external fun exportMesh(
-        head: Long,
-        path: ByteArray,
-        meshOptions: DoubleArray,
-        folder: ByteArray?,
-        names: Array<ByteArray>?,
-        buffers: Array<ByteBuffer>?,
-    )
-
-    @JvmStatic
-    external fun createRenderer(
-        context: Long,
+    external fun createMesh(
         head: Long,
         values: DoubleArray,
-        meshOptions: DoubleArray,
         folder: ByteArray?,
         names: Array<ByteArray>?,
         buffers: Array<ByteBuffer>?,
     ): Long
 
+    @JvmStatic external fun destroyMesh(mesh: Long)
+    @JvmStatic external fun saveMesh(mesh: Long, path: ByteArray)
+
+    /**
+     * Direct buffers with positions, normals, colours, template points, triangles and texture coordinates (or null); the
+     * texture's file (or null); for each morph target name, vertices and deltas. Writes the simplification error.
+     */
+    @JvmStatic external fun meshArrays(mesh: Long, errorM: FloatArray): Array<Any?>
+
+    @JvmStatic external fun createRenderer(context: Long, mesh: Long, values: DoubleArray): Long
     @JvmStatic external fun destroyRenderer(renderer: Long)
 
     @JvmStatic
@@ -99,7 +83,4 @@ internal object NativeHead {
 
     @JvmStatic external fun setShading(renderer: Long, shading: Int)
     @JvmStatic external fun render(renderer: Long, camera: DoubleArray): Long
-    @JvmStatic external fun releaseImage(image: Long)
-    @JvmStatic external fun planeOfImage(image: Long, plane: Int, rowBytes: Int, heightPx: Int): ByteBuffer
-    @JvmStatic external fun saveImage(image: Long, path: ByteArray, withAlpha: Boolean)
 }

@@ -1,6 +1,6 @@
 package dev.maquette.jni
 
-import dev.maquette.Progress
+import dev.maquette.NativeProgress
 import java.nio.ByteBuffer
 
 /** The C API's captures and scenes, as [Native]. */
@@ -25,8 +25,7 @@ internal object NativeScene {
         names: Array<ByteArray>?,
         buffers: Array<ByteBuffer>?,
         values: DoubleArray,
-        progress: Progress?,
-        stats: DoubleArray,
+        progress: NativeProgress?,
     ): Long
 
     @JvmStatic
@@ -41,8 +40,9 @@ internal object NativeScene {
         values: DoubleArray,
     ): Long
 
+    @JvmStatic external fun buildStats(scene: Long): DoubleArray
     @JvmStatic external fun destroyBuilder(builder: Long)
-    @JvmStatic external fun addView(builder: Long, photo: Long, camera: DoubleArray, progress: Progress?): Long
+    @JvmStatic external fun addView(builder: Long, photo: Long, camera: DoubleArray, progress: NativeProgress?): Long
     @JvmStatic external fun cancelBuilder(builder: Long)
     @JvmStatic external fun builderStats(builder: Long): DoubleArray
     @JvmStatic external fun finishBuilder(builder: Long): Long
@@ -68,8 +68,4 @@ internal object NativeScene {
 
     @JvmStatic external fun destroyRenderer(renderer: Long)
     @JvmStatic external fun render(renderer: Long, camera: DoubleArray): Long
-    @JvmStatic external fun releaseImage(image: Long)
-    @JvmStatic external fun planeOfImage(image: Long, plane: Int, rowBytes: Int, heightPx: Int): ByteBuffer
-    @JvmStatic external fun statsOfImage(image: Long): DoubleArray
-    @JvmStatic external fun saveImage(image: Long, path: ByteArray, withAlpha: Boolean)
 }

@@ -11,7 +11,7 @@ import dev.maquette.DensePoseResult
 import dev.maquette.Head
 import dev.maquette.HeadBox
 import dev.maquette.HeadBuilder
-import dev.maquette.HeadMeshOptions
+import dev.maquette.HeadMesh
 import dev.maquette.HeadRenderer
 import java.io.File
 import java.util.concurrent.atomic.AtomicBoolean
@@ -21,12 +21,12 @@ open class HeadActivity : PictureScreen() {
     /** Where the camera stands, radians: to the person's left, and above. */
     private data class Place(val yaw: Double = 0.0, val pitch: Double = 0.0)
 
-    private class View(val head: Head, val renderer: HeadRenderer)
+    private class View(val mesh: HeadMesh, val renderer: HeadRenderer)
 
     // Of the worker; with the networks, which are loaded when there is a photo.
     private val densePose = lazy { maquette.densePose(networks("densepose-b-int8")) }
     private val builder = lazy {
-        maquette.headBuilder(networks("heads-int8"), HeadBuilder.Config(texturePx = TEXTURE_PX))
+        maquette.headBuilder(networks("heads-int8"), HeadBuilder.Config(texture = HeadBuilder.Texture.ON, texturePx = TEXTURE_PX))
     }
     private var view: View? = null
 
@@ -86,13 +86,14 @@ open class HeadActivity : PictureScreen() {
             val box = densePose.value.run(frame).use(::largestHead)
             builder.addPhoto(frame, box)
         }
-        val head = builder.fit(SECONDS, preview = ::showPreview) { !isDestroyed } // false cancels
+        val head = builder.fit(SECONDS, preview = ::showPreview) { _, _ -> !isDestroyed } // false cancels
+        val mesh = head.use { it.mesh() }
         closeView()
-        view = View(head, maquette.headRenderer(head))
+        view = View(mesh, maquette.headRenderer(mesh))
         val used = builder.stats.usedPhotos
         val from = if (used == 1) "1 photo" else "$used photos"
-        val leftOut = builder.stats.photos - used
-        return "A head from $from" + if (leftOut > 0) "; $leftOut left out, of another person." else ". Drag to turn it."
+        val rejected = builder.stats.photos - used
+        return "A head from $from" + if (rejected > 0) "; $rejected rejected, of a different person." else ". Drag to turn it."
     }
 
     private fun largestHead(people: DensePoseResult): HeadBox? =
@@ -103,8 +104,8 @@ open class HeadActivity : PictureScreen() {
     /** The head as far as it is, with a coarse mesh: the fit waits. */
     private fun showPreview(head: Head) {
         val picture =
-            head.use {
-                maquette.headRenderer(head, HeadRenderer.Config(mesh = HeadMeshOptions(cellM = PREVIEW_CELL_M)))
+            head.use { it.mesh(HeadMesh.Config(cellM = PREVIEW_CELL_M)) }.use { mesh ->
+                maquette.headRenderer(mesh)
                     .use { renderer -> renderer.run(renderer.camera(0.0, 0.0, SIDE_PX, SIDE_PX)).use { it.toBitmap() } }
             }
         runOnUiThread {
@@ -116,7 +117,7 @@ open class HeadActivity : PictureScreen() {
 
     private fun closeView() {
         view?.renderer?.close()
-        view?.head?.close()
+        view?.mesh?.close()
         view = null
     }
 
@@ -163,10 +164,10 @@ open class HeadActivity : PictureScreen() {
 
     private fun save(to: Uri) =
         inBackground({
-            val head = view?.head ?: error("There is no head yet: choose a photo.")
+            val mesh = view?.mesh ?: error("There is no head yet: choose a photo.")
             val file = File.createTempFile("head", ".glb", cacheDir)
             try {
-                head.export(file.path)
+                mesh.save(file.path)
                 write(to, file)
             } finally {
                 file.delete()

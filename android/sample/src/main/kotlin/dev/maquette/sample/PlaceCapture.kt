@@ -8,7 +8,7 @@ import dev.maquette.PixelFormat
 import dev.maquette.PointCloud
 import dev.maquette.Scene
 import dev.maquette.SceneBuildConfig
-import dev.maquette.SceneProgress
+import dev.maquette.Progress
 import java.nio.ByteBuffer
 import kotlin.math.abs
 import kotlin.math.acos
@@ -71,7 +71,7 @@ class PlaceCapture(private val maxPhotos: Int = 60) : AutoCloseable {
         maquette: Maquette,
         networks: ModelBundle,
         longSidePx: Int = 640,
-        progress: SceneProgress = SceneProgress { _, _ -> true },
+        progress: Progress = Progress { _, _ -> true },
     ): Scene {
         check(photoCount >= MIN_PHOTOS) { "There are $photoCount photos; walk around until there are $MIN_PHOTOS." }
         check(pointCount >= MIN_POINTS) { "Too little was measured. Look at things with edges and patterns." }

@@ -6,8 +6,8 @@ import dev.maquette.Maquette
 import dev.maquette.ModelBundle
 import dev.maquette.PinholeCamera
 import dev.maquette.PixelFormat
+import dev.maquette.RenderedImage
 import dev.maquette.Scene
-import dev.maquette.SceneImage
 import dev.maquette.TestFiles
 import java.io.File
 import java.nio.ByteBuffer
@@ -63,7 +63,7 @@ class PosedRoom(
         val expected = capture.loadView(index).use { photo -> photo.resize(160, 120).use(::bgr) }
         return maquette.sceneRenderer(scene, networks).use { renderer ->
             renderer.run(camera).use { image ->
-                val seen = ByteArray(expected.size).also { image.plane(SceneImage.Plane.BGR).get(it) }
+                val seen = ByteArray(expected.size).also { image.plane(RenderedImage.Plane.BGR).get(it) }
                 seen.zip(expected) { a, b -> abs(a.toUByte().toInt() - b.toUByte().toInt()) }.average()
             }
         }

@@ -1,4 +1,4 @@
-"""Pictures of heads by the Python package, and the head of a person whom dense pose finds."""
+"""Images of heads by the Python package, and the head of a person whom dense pose finds."""
 
 import gc
 from pathlib import Path
@@ -22,23 +22,23 @@ def test_planes_show_the_mesh(head, renderer):
     camera = renderer.camera(yaw_rad=0.4, pitch_rad=0.1, width_px=160, height_px=120)
     image = renderer.run(camera)
 
-    assert image.rgb.shape == image.normals.shape == image.template_points_m.shape == (120, 160, 3)
-    assert image.alpha.shape == image.depth_m.shape == (120, 160)
+    assert image.rgb.shape == image.normals.shape == image.template_points.shape == (120, 160, 3)
+    assert image.alpha.shape == image.depth.shape == (120, 160)
     inside = image.alpha == 255
     assert 0.1 < inside.mean() < 0.8
-    for plane in (image.rgb, image.depth_m, image.normals, image.template_points_m):
+    for plane in (image.rgb, image.depth, image.normals, image.template_points):
         assert not plane[image.alpha == 0].any()
     assert camera.centre[0] > 0.1  # to the person's left
     # Pixels at their depths lie on the mesh, with its normals and template points.
     y, x = np.nonzero(inside)
     given = camera.intrinsics
     rays = np.stack([(x - given.cx_px) / given.fx_px, (y - given.cy_px) / given.fy_px, np.ones(len(x))], 1)
-    points = (rays * image.depth_m[inside][:, None]) @ camera.rotation + camera.centre
+    points = (rays * image.depth[inside][:, None]) @ camera.rotation + camera.centre
     distance, nearest = cKDTree(mesh.positions_m).query(points)
     assert distance.max() < COARSE_M
     in_camera = mesh.normals[nearest] @ camera.rotation.T
     assert (image.normals[inside] * in_camera).sum(1).mean() > 0.97
-    assert np.abs(image.template_points_m[inside] - mesh.template_points_m[nearest]).max() < 2 * COARSE_M
+    assert np.abs(image.template_points[inside] - mesh.template_points_m[nearest]).max() < 2 * COARSE_M
     assert image.rgb[inside].mean(0)[0] > image.rgb[inside].mean(0)[2]  # red, then blue
 
 
@@ -60,7 +60,7 @@ def test_shadings_differ_and_backgrounds_are_behind(head, renderer):
     finally:
         renderer.set_shading("colour")
     assert len(seen) == 5
-    own = maquette.HeadRenderer(head, "normals", background=(10, 20, 30), cell_m=COARSE_M, threads=1)
+    own = maquette.HeadRenderer(head.mesh(cell_m=COARSE_M), "normals", background=(10, 20, 30), threads=1)
     rgb = own.run(camera).rgb
     assert rgb[0, 0].tolist() == [10, 20, 30]
     assert rgb.tobytes() not in seen
@@ -72,7 +72,7 @@ def test_many_pictures_and_heads_are_freed(builder, renderer):
     assert all((image.alpha == kept[0].alpha).all() for image in kept)
     builder.add_photo(GREY, BOX)
     for _ in range(5):
-        builder.fit(0, progress=lambda done: None, preview=lambda head: None)
+        builder.fit(0, progress=lambda done, stage: None, preview=lambda head: None)
     gc.collect()
 
 
@@ -92,7 +92,7 @@ def test_the_head_of_a_person_is_built_with_the_shipped_bundle():
     pupils_m = head.landmark("pupil_left").point_m - head.landmark("pupil_right").point_m
     assert 0.05 < np.linalg.norm(pupils_m) < 0.075
     # By the camera of the photo it lies where dense pose sees the head.
-    y, x = np.nonzero(maquette.HeadRenderer(head, cell_m=COARSE_M, threads=1).run(head.camera()).alpha)
+    y, x = np.nonzero(maquette.HeadRenderer(head.mesh(cell_m=COARSE_M), threads=1).run(head.camera()).alpha)
     assert left < x.mean() < right
     assert top < y.mean() < bottom
 

@@ -1,0 +1,20 @@
+// An image that a renderer makes, of a scene or of a mesh, and what it knows of each pixel.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace maq {
+
+// Planes row by row, without padding; memory is kept between uses.
+struct RenderedImage {
+  int width_px = 0, height_px = 0;
+  std::vector<uint8_t> bgr;
+  std::vector<uint8_t> alpha;  // coverage: 0 where nothing is
+  std::vector<float> depth;    // along the optical axis; 0 where nothing is
+  // Empty for scenes; 0 where nothing is.
+  std::vector<float> normals;          // x, y, z in the camera, of length 1
+  std::vector<float> template_points;  // x, y, z on the template head; empty where the mesh has none
+};
+
+}  // namespace maq

@@ -35,7 +35,7 @@ std::string camera_fault(const HeadCamera& camera) {
   }
   if (!is_rotation(camera.head_to_camera.rotation)) return "the rotation of one of its cameras is not one";
   if (!(std::abs(t.x) <= 1e9 && std::abs(t.y) <= 1e9 && std::abs(t.z) <= 1e9)) {
-    return "one of its cameras is not at a finite place, or is far away";
+    return "one of its cameras is not at a finite position, or is far away";
   }
   return "";
 }

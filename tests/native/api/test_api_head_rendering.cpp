@@ -210,7 +210,7 @@ TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
   int unknown = 9;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   refused("config.struct_size is 4", [](Config& c) { c.struct_size = 4; });
-  refused("config.model.threads", [](Config& c) { c.threads = 65; });
+  refused("config.threads", [](Config& c) { c.threads = 65; });
   refused("config.near_m", [](Config& c) { c.near_m = -1; });
   refused("config.near_m", [&](Config& c) { c.near_m = nan; });
   refused("config.shading", [&](Config& c) { c.shading = maq_head_shading(unknown); });

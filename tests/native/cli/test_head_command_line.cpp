@@ -61,7 +61,7 @@ TEST_F(HeadCommandLine, PhotosAreAddedToASavedHead) {
   ASSERT_EQ(added.exit_code, 0) << added.err;
   EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2);
   expect_error(made + "--append none.maqh", 1, "none.maqh");
-  expect_error(made + "--append a.maqh --person all", 1, "--append is one person's head");
+  expect_error(made + "--append a.maqh --person all", 1, "--append takes the head of one person");
   EXPECT_EQ(nlohmann::json::parse(run("info a.maqh --json").out)["photos"], 2) << "what was there stays";
 }
 

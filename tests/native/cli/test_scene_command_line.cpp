@@ -223,7 +223,7 @@ TEST_F(SceneCommandLine, WrongUsageIsExitCodeTwoAndHelpTeaches) {
   EXPECT_EQ(files(), std::set<std::string>{});
   const Outcome help = run("--help");
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_NE(help.out.find("maquette scene build my-place --out my-place.maqs"), std::string::npos) << help.out;
+  EXPECT_NE(help.out.find("maquette scene build my-room --out my-room.maqs"), std::string::npos) << help.out;
 }
 
 TEST_F(SceneCommandLine, CtrlCLeavesTheOldFiles) {

@@ -216,7 +216,7 @@ TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation[4] += 1e-4; });
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation = {1, 0, 0, 0, 1, 0, 0, 0, -1}; });
   refuse("rotation", [](StoredHead& h) { h.cameras[0].head_to_camera.rotation[0] = NAN; });
-  refuse("finite landmark", [](StoredHead& h) { h.cameras[0].head_to_camera.translation.z = NAN; });
+  refuse("finite position", [](StoredHead& h) { h.cameras[0].head_to_camera.translation.z = NAN; });
   refuse("scale is 0", [](StoredHead& h) { h.scale.metres_per_unit = 0; });
   refuse("sigma nan", [](StoredHead& h) { h.scale.sigma = NAN; });
   refuse("source 3", [](StoredHead& h) { h.scale.source = ScaleSource(3); });

@@ -262,7 +262,7 @@ TEST_F(ApiSceneRendering, OtherNetworksThanTheScenesAreRefused) {
   nlohmann::json manifest = nlohmann::json::parse(read_text(bundle + "/manifest.json"));
   manifest["files"]["basis.bin"]["sha256"] = read_text(folder.file("sum")).substr(0, 64);
   write_text(bundle + "/manifest.json", manifest.dump());
-  expect_refused(config, MAQ_ERROR_BAD_BUNDLE, "other networks");
+  expect_refused(config, MAQ_ERROR_BAD_BUNDLE, "Other networks than those");
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ def play(uri: str, *arguments: str, **environment: str) -> dict:
         raise FileNotFoundError(f"{frame_time.PROGRAM} is not there: make build")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "play.json"
-        command = [str(frame_time.PROGRAM), "play", uri, *arguments, "--no-picture", "--json", str(path)]
+        command = [str(frame_time.PROGRAM), "play", uri, *arguments, "--no-image", "--json", str(path)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | environment)
         return json.loads(path.read_text())
 

@@ -2,7 +2,7 @@
  *
  *   cc -shared -fPIC -O2 -I sdk/include -o count_allocations.so benchmarks/count_allocations.c
  *   LD_PRELOAD=./count_allocations.so COUNT_FROM=200 COUNT_TO=1200 COUNT_FILE=count.json \
- *       maquette play 'stub:pattern?live=1&fps=400' --frames 1200 --no-picture
+ *       maquette play 'stub:pattern?live=1&fps=400' --frames 1200 --no-image
  *
  * writes {"frames": 1000, "allocations": 0, "of_onnxruntime": 0} when frame 1200 is taken: allocations of all threads
  * since frame 200, and those by ONNX Runtime (its code, rather than the SDK's, is the nearest caller of the two). The

@@ -50,7 +50,7 @@ class EdgesResult:
     @staticmethod
     def of(found: maquette.EdgesResult) -> EdgesResult:
         curves = None if found.curves is None else Curves.of(found.curves)
-        return EdgesResult(found.distance_r, found.spread_r, found.kind, SimpleNamespace(**found.stats), curves)
+        return EdgesResult(found.distance_r, found.expected_error_r, found.kind, SimpleNamespace(**found.stats), curves)
 
 
 @dataclass(frozen=True)

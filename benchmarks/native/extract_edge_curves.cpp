@@ -30,7 +30,7 @@ bool read_field(std::FILE* file, maq::EdgeField& field) {
   field.eps_r = float(numbers[4]);
   const size_t pixels = size_t(size[0]) * size_t(size[1]);
   field.distance_r.resize(pixels), field.depth_m.resize(pixels), field.kind.resize(pixels);
-  field.spread_r.assign(pixels, float(numbers[5]));
+  field.expected_error_r.assign(pixels, float(numbers[5]));
   read(file, field.distance_r.data(), pixels);
   read(file, field.depth_m.data(), pixels);
   read(file, field.kind.data(), pixels);

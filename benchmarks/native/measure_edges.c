@@ -21,11 +21,11 @@ static double peak_mb(void) {
   return kib * 1024e-6;
 }
 
-static maq_status run_frame(maq_edges* edges, maq_source* source, const maq_intrinsics* intrinsics) {
+static maq_status run_frame(maq_edges* edges, maq_source* source) {
   maq_frame* frame = NULL;
   maq_edges_result* result = NULL;
   maq_status status = maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame);
-  if (status == MAQ_OK && edges != NULL) status = maq_edges_run(edges, frame, intrinsics, &result);
+  if (status == MAQ_OK && edges != NULL) status = maq_edges_run(edges, frame, &result);
   maq_edges_result_release(result);
   maq_frame_release(frame);
   return status;
@@ -36,7 +36,6 @@ int main(int argc, char** argv) {
   maq_source* source = NULL;
   maq_edges* edges = NULL;
   maq_edges_config config;
-  maq_intrinsics intrinsics;
   double before_mb = 0;
   int count;
   maq_status status;
@@ -46,16 +45,15 @@ int main(int argc, char** argv) {
   }
   status = maq_context_create(MAQ_HEADER_VERSION, NULL, &context);
   if (status == MAQ_OK) status = maq_source_create(context, argv[2], NULL, &source);
-  if (status == MAQ_OK) status = maq_source_get_intrinsics(source, &intrinsics);
-  if (status == MAQ_OK) status = run_frame(NULL, source, &intrinsics); /* the source's own memory */
+  if (status == MAQ_OK) status = run_frame(NULL, source); /* the source's own memory */
   before_mb = peak_mb();
   if (status == MAQ_OK) status = maq_edges_config_init(&config, sizeof config);
   if (status == MAQ_OK) {
-    config.bundle_path = argv[1];
-    config.threads = atoi(argv[4]);
+    config.model.bundle_path = argv[1];
+    config.model.threads = atoi(argv[4]);
     status = maq_edges_create(context, &config, &edges);
   }
-  for (count = atoi(argv[3]); status == MAQ_OK && count > 0; --count) status = run_frame(edges, source, &intrinsics);
+  for (count = atoi(argv[3]); status == MAQ_OK && count > 0; --count) status = run_frame(edges, source);
   if (status != MAQ_OK) fprintf(stderr, "measure_edges: %s\n", maq_last_error(NULL));
   printf("{\"memory_mb\": %.3f}\n", peak_mb() - before_mb);
   maq_edges_destroy(edges);

@@ -111,12 +111,13 @@ maquette::Saver::Companions EdgesView::companions() const {
   if (frame().result == nullptr) return nullptr;
   return [result = frame().result, found = frame().found, formats = formats_](const std::string& folder,
                                                                               const std::string& stem) {
-    result->save(folder, stem);
+    const std::string path = (std::filesystem::path(folder) / stem).string();
+    result->save(path);
     std::string names = "_distance.png, _kind.png, _edges.json";
     for (size_t i = 0; i < kFormats.size() && found != nullptr; ++i) {
       if (!formats[i]) continue;
       const std::string ending = std::string("_curves.") + kFormats[i];
-      found->save((std::filesystem::path(folder) / (stem + ending)).string());
+      found->save(path + ending);
       names += ", " + ending;
     }
     return names;
@@ -136,7 +137,7 @@ void EdgesView::add_to_report(nlohmann::ordered_json* report) const {
                    {"boxes", nlohmann::json::array()},
                    {"at_pointer", nullptr}};
   for (const maq_edges_box& box : frame().boxes) {
-    json["edges"]["boxes"].push_back({{"size_m", box.size_m}, {"plus_minus_m", box.plus_minus_m}});
+    json["edges"]["boxes"].push_back({{"size_m", box.size_m}, {"size_tolerance_m", box.size_tolerance_m}});
   }
   if (pick_.curve < 0) return;
   json["edges"]["at_pointer"] = {{"curve", pick_.curve},
@@ -183,7 +184,10 @@ void EdgesView::draw_model_options() {
   ImGui::SameLine(150 * window_.scale());
   ImGui::Text("network on %.0f %%",
               100.0 * double(frame().stats.network_pixel_count) / double(std::max<int64_t>(1, pixels)));
-  changed |= ImGui::CheckboxFlags("threads stay awake", &model_.edges.allow_spinning, 1);
+  maq_spinning& spinning = model_.edges.model.spinning;
+  bool is_awake = spinning != MAQ_SPINNING_OFF;
+  changed |= ImGui::Checkbox("threads stay awake", &is_awake);
+  spinning = is_awake ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
   if (changed) live_.set_model(model_);
 }
 

@@ -32,8 +32,7 @@ int main(int argc, char** argv) try {
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
   // A thread that stays awake takes a core from the window.
-  options.model.model.spinning = MAQ_SPINNING_OFF;
-  options.edges_model.edges.allow_spinning = 0;
+  options.model.model.spinning = options.edges_model.edges.model.spinning = MAQ_SPINNING_OFF;
   bool part_only = false, skip_planes = false;
   double ahead_ms = options.prediction.ahead_s * 1e3;
   std::string method = kMethodNames[0];
@@ -151,8 +150,8 @@ int main(int argc, char** argv) try {
     throw std::runtime_error("--size " + size + " is no size of a window: write it as 1280x800, each 64 to 16384.");
   }
   options.model.model.bundle_path = options.bundle.c_str();
-  options.edges_model.edges.bundle_path = options.edges_bundle.c_str();
-  options.edges_model.edges.threads = options.model.model.threads;
+  options.edges_model.edges.model.bundle_path = options.edges_bundle.c_str();
+  options.edges_model.edges.model.threads = options.model.model.threads;
   options.edges_model.edges.skip_planes = skip_planes ? 1 : 0;
   options.model.detail = part_only ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
   if (options.headless) {

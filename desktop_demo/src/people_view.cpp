@@ -4,6 +4,7 @@
 #include <imgui.h>
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <maquette/densepose_mesh.hpp>
 #include <thread>
@@ -112,7 +113,7 @@ void PeopleView::draw_boxes() const {
 maquette::Saver::Companions PeopleView::companions() const {
   if (frame().result == nullptr) return nullptr;
   return [result = frame().result](const std::string& folder, const std::string& stem) {
-    result->save(folder + "/" + stem);
+    result->save((std::filesystem::path(folder) / stem).string());
     return "_IUV.png, _INDS.png and .json";
   };
 }

@@ -8,44 +8,46 @@ from typing import Any
 
 import numpy as np
 
-from maquette.frames import Frame, Intrinsics, as_frame
+from maquette.frames import Frame, Intrinsics
 from maquette.native import NativeObject, native
 
 KINDS = ("none", "crease", "boundary")
 TYPES = ("line", "arc", "spline")
-BENDS = ("unknown", "convex", "concave")
+CONVEXITIES = ("unknown", "convex", "concave")
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """points_m: float64 [n, 3], the polyline that is drawn of it, in the camera's coordinates. type: "line", "arc" or
-    "spline". kind: "crease" or "boundary". bend: of a crease "convex", "concave" or "unknown". corners: index of the
-    corner at its start and its end, -1 where it ends freely."""
+    """points_m: float64 [n, 3], a polyline along the curve, in the camera's coordinates. type: "line", "arc" or
+    "spline". kind: "crease" or "boundary". convexity: "convex", "concave" or "unknown", for a crease. corners: indices
+    of the corners at its start and its end, -1 for a free end. rms_footprints: root mean square distance of the measured
+    points from the curve, in footprints r."""
 
     points_m: np.ndarray
     type: str
     kind: str
-    bend: str
+    convexity: str
     corners: tuple[int, int]
     length_m: float
-    rms_r: float
+    rms_footprints: float
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """size_m, plus_minus_m: float64 [3], the longest side first; two standard deviations. axes: float64 [3, 3], a row a
-    side. centre_m: float64 [3]. corner_count: how many of its eight corners were seen."""
+    """size_m: float64 [3], lengths of the sides, the longest first. size_tolerance_m: float64 [3], two standard
+    deviations of each length. axes: float64 [3, 3], one row for each side. centre_m: float64 [3]. corner_count: visible
+    corners, at most 8."""
 
     size_m: np.ndarray
-    plus_minus_m: np.ndarray
+    size_tolerance_m: np.ndarray
     axes: np.ndarray
     centre_m: np.ndarray
     corner_count: int
 
 
 class Curves(NativeObject):
-    """The curves of a depth image: `curves`, `corners_m` float64 [n, 3], `boxes`, the largest first; curves_ms,
-    boxes_ms: how long it took to find them. Hold no more than 16 at once (result_pool_size)."""
+    """The curves of a depth image: `curves`, `corners_m` float64 [n, 3], and `boxes`, the largest first. curves_ms,
+    boxes_ms: times for finding them. Hold no more than 16 at once (result_pool_size)."""
 
     def __init__(self, handle: Any) -> None:
         n = native()
@@ -54,8 +56,8 @@ class Curves(NativeObject):
                           n.lib.maq_edges_curves_get_curve_count(handle))  # fmt: skip
         self.curves = [
             Curve(
-                _doubles(c.points_m, c.point_count, 3), TYPES[c.type], KINDS[c.kind], BENDS[c.bend], tuple(c.corners),
-                c.length_m, c.rms_r,
+                _doubles(c.points_m, c.point_count, 3), TYPES[c.type], KINDS[c.kind], CONVEXITIES[c.convexity],
+                tuple(c.corners), c.length_m, c.rms_footprints,
             )
             for c in found
         ]  # fmt: skip
@@ -66,7 +68,7 @@ class Curves(NativeObject):
                           n.lib.maq_edges_curves_get_box_count(handle))  # fmt: skip
         self.boxes = [
             Box(
-                np.array(list(b.size_m)), np.array(list(b.plus_minus_m)), np.array([list(a) for a in b.axes]),
+                np.array(list(b.size_m)), np.array(list(b.size_tolerance_m)), np.array([list(a) for a in b.axes]),
                 np.array(list(b.centre_m)), b.corner_count,
             )
             for b in found
@@ -80,8 +82,9 @@ class Curves(NativeObject):
         native().call("maq_edges_curves_save", self.handle, str(path).encode())
 
     def snap(self, x_px: float, y_px: float, radius_px: float = 8) -> tuple[str, np.ndarray] | None:
-        """What is at a pixel of the depth image: ("corner" | "curve" | "plane", its point float64 [3] in metres), the
-        nearest corner within the radius first; None: nothing."""
+        """Finds the target at a pixel of the depth image: the nearest corner within the radius, or else the nearest
+        curve, or else an adjacent plane. Returns its kind ("corner", "curve", "plane") and its point, float64 [3] in
+        metres; None without a target."""
         n = native()
         found = n.sized("maq_edges_snap")
         n.call("maq_edges_curves_snap_to_pixel", self.handle, x_px, y_px, radius_px, found)
@@ -91,12 +94,13 @@ class Curves(NativeObject):
 
 @dataclass(frozen=True, eq=False)
 class EdgesResult:
-    """Planes [H, W] of a depth image: distance_r, spread_r float32 (to the nearest sharp curve in footprints r, and how
-    far that may be wrong; eps_r: none is nearer), kind uint8 (0 none, 1 crease, 2 boundary), distance_m float32 (0
-    where depth is unknown). curves: if asked for. stats: the fields of maq_edges_stats."""
+    """Planes [H, W] of a depth image. distance_r: float32, distance to the nearest sharp curve in footprints r; eps_r
+    where no curve is nearer. expected_error_r: float32, predicted mean absolute error of distance_r. kind: uint8 (0
+    none, 1 crease, 2 boundary). distance_m: float32, 0 where depth is unknown. curves: None unless requested. stats: the
+    fields of maq_edges_stats."""
 
     distance_r: np.ndarray
-    spread_r: np.ndarray
+    expected_error_r: np.ndarray
     kind: np.ndarray
     distance_m: np.ndarray
     eps_r: float
@@ -110,8 +114,8 @@ class Edges(NativeObject):
         result = maquette.Edges().run(depth_m, maquette.Intrinsics.centred(640, 480, fov_deg=60), curves=True)
         print(result.curves.boxes[0].size_m)
 
-    bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
-    maq_edges_config by their names: skip_planes, threads, ... Raises MaquetteError.
+    bundle: a folder with manifest.json (default: the bundle in the package). settings: fields of maq_edges_config and
+    of its model by their names: skip_planes, threads, ... Raises MaquetteError.
     """
 
     def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:
@@ -122,10 +126,15 @@ class Edges(NativeObject):
         super().__init__(n.create("maq_edges", n.context, n.config("maq_edges_config", settings)))
 
     def run(
-        self, depth: Frame | np.ndarray, intrinsics: Intrinsics, curves: bool = False, **curve_settings: Any
+        self,
+        depth: Frame | np.ndarray,
+        intrinsics: Intrinsics | None = None,
+        curves: bool = False,
+        **curve_settings: Any,
     ) -> EdgesResult:
-        """depth: a Frame, float32 [H, W] in metres or uint16 [H, W] in millimetres. curves: find them, corners and
-        boxes, too; curve_settings: fields of maq_edges_curves_config. One call at a time. Raises MaquetteError."""
+        """depth: a Frame with its intrinsics, float32 [H, W] in metres or uint16 [H, W] in millimetres. intrinsics: for
+        an array. curves: also find curves, corners and boxes. curve_settings: fields of maq_edges_curves_config. One
+        call at a time. Raises MaquetteError; ValueError for a Frame with other intrinsics."""
         result = self.run_native(depth, intrinsics)
         found = None
         if curves:
@@ -135,23 +144,23 @@ class Edges(NativeObject):
             found = Curves(n.create("maq_edges_curves", result, config, function=find, release=release))
         return self.copied(result, found)
 
-    def run_native(self, depth: Frame | np.ndarray, intrinsics: Intrinsics) -> Any:
-        """The library's own result (maq_edges_result) of a depth image, for calls of the C API that this package does
-        not have. It goes back to its pool when the object is freed."""
-        n = native()
-        frame, given = as_frame(depth), n.ffi.new("maq_intrinsics *")
-        intrinsics.write_to(given)
+    def run_native(self, depth: Frame | np.ndarray, intrinsics: Intrinsics | None = None) -> Any:
+        """Returns the library's own result (maq_edges_result), for calls of the C API that this package does not have.
+        It goes back to its pool when the object is freed."""
+        if isinstance(depth, Frame) and intrinsics is not None and depth.intrinsics != intrinsics:
+            raise ValueError("The frame has its own intrinsics; wrap an array as Frame(depth, intrinsics=...) instead.")
+        frame = depth if isinstance(depth, Frame) else Frame(depth, intrinsics=intrinsics)
         run, release = "maq_edges_run", "maq_edges_result_release"
-        return n.create("maq_edges_result", self.handle, frame.handle, given, function=run, release=release)
+        return native().create("maq_edges_result", self.handle, frame.handle, function=run, release=release)
 
     def copied(self, result: Any, curves: Curves | None = None) -> EdgesResult:
-        """What a result of `run_native` holds, as arrays; it goes back to its pool."""
+        """Copies a result of `run_native` to arrays, and returns it to its pool."""
         n = native()
         field = n.sized("maq_edges_field")
         n.call("maq_edges_result_get_field", result, field)
         shape = field.height_px, field.width_px
         wanted = (
-            (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_SPREAD, np.float32),
+            (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_EXPECTED_ERROR, np.float32),
             (n.lib.MAQ_EDGES_PLANE_KIND, np.uint8),
         )  # fmt: skip
         planes = [n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted]

@@ -81,10 +81,17 @@ class Frame(NativeObject):
 
     `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), uint8 [H, W]
     (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Don't write to the array while a
-    model reads it. Frames of a `Source` have the time and the number of the camera.
+    model reads it. intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the time,
+    the number and, if they are known, the intrinsics of the camera.
     """
 
-    def __init__(self, pixels: np.ndarray, format: PixelFormat | None = None, timestamp_ns: int = 0) -> None:
+    def __init__(
+        self,
+        pixels: np.ndarray,
+        format: PixelFormat | None = None,
+        timestamp_ns: int = 0,
+        intrinsics: Intrinsics | None = None,
+    ) -> None:
         format = _format_of(pixels) if format is None else PixelFormat(format)
         kind, channels = _KINDS[format]
         shape = pixels.shape[:2] if channels == 1 and pixels.ndim == 2 else (*pixels.shape[:2], channels)
@@ -97,6 +104,8 @@ class Frame(NativeObject):
         n.call("maq_frame_desc_init", description, description.struct_size)
         description.format, description.timestamp_ns = int(format), timestamp_ns
         description.height_px, description.width_px = pixels.shape[:2]
+        if intrinsics is not None:
+            intrinsics.write_to(description.intrinsics)
         description.planes[0] = n.ffi.cast("const uint8_t *", n.ffi.from_buffer(self._pixels))
         wrap, release = "maq_frame_wrap", "maq_frame_release"
         null = n.ffi.NULL
@@ -143,6 +152,12 @@ class Frame(NativeObject):
     def sequence(self) -> int:
         """The number of the frame in its source, from 0; gaps are frames that were dropped."""
         return self._description().sequence
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The camera of the frame; None if it is unknown."""
+        struct = self._description().intrinsics
+        return Intrinsics.of_struct(struct) if struct.width_px else None
 
     @property
     def origin(self) -> Origin | None:

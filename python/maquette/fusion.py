@@ -1,4 +1,4 @@
-"""Edges of one thing seen from several places: fields of posed depth images fused into points and curves."""
+"""Edges of one object or room from several views: fields of posed depth images fused into points and curves."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ POINT = np.dtype([("point_m", "<f8", 3), ("normal", "<f4", 3), ("distance_m", "<
 class EdgesFusion(NativeObject):
     """Add views, finish, then ask for points and curves, in the world of the cameras.
 
-    edges: the network. progress: called by `finish` with the fraction done; returns False to cancel, and what it raises
-    comes out of `finish`. settings: fields of maq_edges_fusion_config by their names: cell_m, min_views, max_points,
-    ... Raises MaquetteError, as all methods do.
+    edges: the network. progress: called by `finish` with the fraction done; return False to cancel. `finish` raises its
+    exceptions. settings: fields of maq_edges_fusion_config by their names: cell_m, min_views, max_points, ... All
+    methods raise MaquetteError.
     """
 
     def __init__(
@@ -35,21 +35,21 @@ class EdgesFusion(NativeObject):
         super().__init__(n.create("maq_edges_fusion", n.context, config))
 
     def add_view(self, depth: Frame | np.ndarray, camera: PinholeCamera) -> EdgesResult:
-        """Runs the network on a depth image in metres and adds its field; the field."""
-        result = self._edges.run_native(depth, camera.intrinsics)
+        """Runs the network on a depth image and adds its field. Returns the field."""
+        result = self._edges.run_native(depth, None if isinstance(depth, Frame) else camera.intrinsics)
         self.add_native(result, camera)
         return self._edges.copied(result)
 
     def add_native(self, result: Any, camera: PinholeCamera) -> None:
-        """The same for a result of `Edges.run_native`."""
+        """Adds a result of `Edges.run_native`."""
         native().call("maq_edges_fusion_add_view", self.handle, result, camera.to_struct())
 
     def finish(self) -> None:
-        """Makes points and curves of the views so far; more can be added afterwards."""
+        """Computes points and curves of the views so far; more can be added afterwards."""
         self._progress.run(lambda: native().call("maq_edges_fusion_finish", self.handle))
 
     def curves(self) -> Curves:
-        """Those of the latest `finish`; without boxes, and with nothing to snap to. Hold no more than 4 at once."""
+        """Returns the curves of the latest `finish`, without boxes and snapping. Hold no more than 4 at once."""
         n = native()
         return Curves(
             n.create("maq_edges_curves", self.handle, function="maq_edges_fusion_find_curves",
@@ -62,7 +62,8 @@ class EdgesFusion(NativeObject):
         return native().stats("maq_edges_fusion_info", "maq_edges_fusion_get_info", self.handle)
 
     def points(self) -> np.ndarray:
-        """POINT [N] of the latest `finish`: place, normal, distance to the nearest edge, footprint, number of views."""
+        """Returns POINT [N] of the latest `finish`: position, normal, distance to the nearest edge, footprint, number
+        of views."""
         n = native()
         out = np.empty(int(self.info["point_count"]), POINT)
         if len(out):

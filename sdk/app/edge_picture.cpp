@@ -66,8 +66,8 @@ float shade(const float* depth_m, int width, int height, int x, int y, const maq
 }  // namespace
 
 EdgeGroup group_of(const maq_edges_curve& curve) {
-  if (curve.kind == MAQ_EDGE_BOUNDARY) return EdgeGroup::kBoundary;
-  return curve.bend == MAQ_EDGE_BEND_CONCAVE ? EdgeGroup::kConcave : EdgeGroup::kConvex;
+  if (curve.kind == MAQ_EDGES_KIND_BOUNDARY) return EdgeGroup::kBoundary;
+  return curve.convexity == MAQ_EDGES_CONVEXITY_CONCAVE ? EdgeGroup::kConcave : EdgeGroup::kConvex;
 }
 
 void draw_edge_layer(const EdgesResult& result, EdgeLayer layer, RgbaImage* picture) {

@@ -20,7 +20,7 @@ constexpr Rgb kCornerColour{255, 80, 80}, kBoxColour{255, 120, 255};
 enum class EdgeGroup { kConvex, kConcave, kBoundary };
 constexpr std::array<const char*, 3> kEdgeGroupNames = {"convex crease", "concave crease", "boundary"};
 constexpr std::array<Rgb, 3> kEdgeGroupColours = {Rgb{255, 235, 60}, Rgb{90, 255, 90}, Rgb{255, 255, 255}};
-// A crease of unknown bend counts as convex.
+// A crease of unknown convexity counts as convex.
 EdgeGroup group_of(const maq_edges_curve& curve);
 
 enum class EdgeLayer {

@@ -1,4 +1,5 @@
-// The edges of a frame as a window shows them: a layer as a picture, curves, corners, boxes, and what a pointer is at.
+// The edges of a frame for display in a window: a layer as an image, curves, corners, boxes, and the target of a
+// pointer.
 #pragma once
 
 #include <maquette/maquette.hpp>
@@ -9,9 +10,9 @@
 
 namespace maquette {
 
-// What is at a pixel.
+// The target at a pixel.
 struct EdgesPick {
-  maq_edges_snap snap{};     // a corner, or a curve, or the plane beside one
+  maq_edges_snap snap{};     // a corner, a curve, or a plane adjacent to a curve
   int curve = -1;            // the nearest curve within the radius, -1: none
   double curve_away_px = 0;  // how far from the pixel it is
 };

@@ -35,7 +35,7 @@ class LiveEdges : public LivePipeline {
  private:
   static EdgesModel model_of(const Context& context, const LiveEdgesOptions& model) {
     maq_edges_curves_config curves = default_edges_curves_config();
-    curves.find_boxes = model.finds_boxes ? 1 : 0;
+    curves.skip_boxes = model.finds_boxes ? 0 : 1;
     return EdgesModel(context, model.edges, model.finds_curves ? &curves : nullptr);
   }
 

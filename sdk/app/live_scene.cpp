@@ -170,7 +170,8 @@ void LiveScene::render(const Request& request) {
                       {},
                       0,
                       MAQ_CLOCK_MEDIA,
-                      0};
+                      0,
+                      image.camera.intrinsics};
   desc.planes[0] = static_cast<const uint8_t*>(rendered.plane(MAQ_IMAGE_PLANE_BGR, desc.stride_bytes));
   image.rendering.copy_from(Frame(context_, desc));
   image.stats = rendered.scene_stats(), image.photo_index = -1, image.psnr_db = NAN;

@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
   setvbuf(stdout, NULL, _IOLBF, 0);
   must("context", maq_context_create(MAQ_HEADER_VERSION, NULL, &context), NULL);
   must("config", maq_source_config_init(&config, sizeof config), NULL);
-  config.reconnect_ms = 0;
+  config.reconnect_ms = MAQ_NO_RECONNECT;
   must("open", maq_source_create(context, argv[1], &config, &source), context);
   for (i = 0; i < frames; ++i) {
     maq_frame_release(frame);

@@ -11,7 +11,7 @@ figure() {
 
 # delivers NAME FRAMES URI
 delivers() {
-    LD_PRELOAD=/count_allocations.so $maquette play "$3" --frames "$2" --no-picture --json "/tmp/$1.json" || return 1
+    LD_PRELOAD=/count_allocations.so $maquette play "$3" --frames "$2" --no-image --json "/tmp/$1.json" || return 1
     grep -q '"dropped_frames": 0' "/tmp/$1.json" || { echo "frames were lost"; return 1; }
 }
 # Delivers, and counts what is taken from the heap once a fifth of the frames has come.
@@ -44,7 +44,7 @@ now() { read -r "$1" rest </proc/uptime; }  # whole hundredths, on the clock of 
 
 # Unplugged and plugged in again, at other times between two looks of the source each time.
 plugs_again() {
-    $maquette play "v4l2:/dev/video0?size=640x480" --no-picture --json /tmp/plug_play.json &
+    $maquette play "v4l2:/dev/video0?size=640x480" --no-image --json /tmp/plug_play.json &
     program=$!
     wait_until sh -c "ls -l /proc/$program/fd | grep -q video0"
     cycles=

@@ -103,17 +103,18 @@ int main(int count, char** arguments) {
   config.state_callback = note_state;
   if (maq_source_create(context, arguments[1], &config, &source) != MAQ_OK) fail("%s", maq_last_error(context));
   if (is_brightness) {
-    maq_control_info info;
+    maq_source_control_info info;
     info.struct_size = sizeof info;
-    if (maq_source_set_control(source, MAQ_CONTROL_BRIGHTNESS, atof(arguments[2])) != MAQ_OK ||
-        maq_source_get_control(source, MAQ_CONTROL_BRIGHTNESS, &info) != MAQ_OK) {
+    if (maq_source_set_control(source, MAQ_SOURCE_CONTROL_BRIGHTNESS, atof(arguments[2])) != MAQ_OK ||
+        maq_source_get_control(source, MAQ_SOURCE_CONTROL_BRIGHTNESS, &info) != MAQ_OK) {
       fail("%s", maq_last_error(source));
     }
     if (info.value != atof(arguments[2])) fail("The brightness is %g after it was set.", info.value);
-    if (maq_source_set_control(source, MAQ_CONTROL_BRIGHTNESS, 100) != MAQ_ERROR_INVALID_ARGUMENT) {
+    if (maq_source_set_control(source, MAQ_SOURCE_CONTROL_BRIGHTNESS, 100) != MAQ_ERROR_INVALID_ARGUMENT) {
       fail("A brightness of 100 is none.");
     }
-    if (maq_source_set_control(source, MAQ_CONTROL_FOCUS, 1) != MAQ_ERROR_UNSUPPORTED) fail("There is no focus.");
+    if (maq_source_set_control(source, MAQ_SOURCE_CONTROL_FOCUS, 1) != MAQ_ERROR_UNSUPPORTED)
+      fail("There is no focus.");
   }
   for (got = 0; got < frames; ++all) {
     maq_status status;

@@ -9,21 +9,20 @@ int main(int argc, char** argv) {
   maq_frame* frame = NULL;
   maq_edges_result* result = NULL;
   maq_edges_curves* curves = NULL;
-  maq_intrinsics intrinsics;
   maq_edges_box box;
   int failed = maq_context_create(MAQ_HEADER_VERSION, NULL, &context) != MAQ_OK ||
                maq_edges_create(context, NULL, &edges) != MAQ_OK ||
                maq_source_create(context, argc == 2 ? argv[1] : NULL, NULL, &source) != MAQ_OK ||
-               maq_source_get_intrinsics(source, &intrinsics) != MAQ_OK ||
                maq_source_acquire_frame(source, MAQ_WAIT_FOREVER, &frame) != MAQ_OK ||
-               maq_edges_run(edges, frame, &intrinsics, &result) != MAQ_OK ||
+               maq_edges_run(edges, frame, &result) != MAQ_OK ||
                maq_edges_result_find_curves(result, NULL, &curves) != MAQ_OK;
   if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   if (maq_edges_curves_get_box_count(curves) > 0) {
     box.struct_size = sizeof box;
     maq_edges_curves_get_box(curves, 0, &box);
     printf("%.0f x %.0f x %.0f mm, each within %.0f, %.0f and %.0f mm\n", 1e3 * box.size_m[0], 1e3 * box.size_m[1],
-           1e3 * box.size_m[2], 1e3 * box.plus_minus_m[0], 1e3 * box.plus_minus_m[1], 1e3 * box.plus_minus_m[2]);
+           1e3 * box.size_m[2], 1e3 * box.size_tolerance_m[0], 1e3 * box.size_tolerance_m[1],
+           1e3 * box.size_tolerance_m[2]);
   } else if (!failed) {
     printf("no box\n");
   }

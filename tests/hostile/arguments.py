@@ -59,7 +59,7 @@ def _options(program: Path, command: tuple[str, ...]) -> tuple[str, ...]:
 SCENE = ("--bundle", str(SCENE_BUNDLE))
 COMMANDS = {
     ("densepose",): (*DENSEPOSE[1:], "a.jpg"),
-    ("play",): ("a.maqrec", "--no-picture"),
+    ("play",): ("a.maqrec", "--no-image"),
     ("record",): ("a.maqrec", "b.maqrec"),
     ("bench",): ("stub:people?size=64x48", "--bundle", str(PEOPLE_BUNDLE), "--seconds", "0", "--runs", "1", "--warm-up",
                  "0", "--threads", "1"),

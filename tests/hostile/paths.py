@@ -64,7 +64,7 @@ OUTPUTS = (
     ("scene", "build", str(CAPTURE), *SCENE, "--out", "b.maqs", "--ply", "{}"),
     ("scene", "render", "a.maqs", *SCENE, *SHOW, "--out", "{}"),
     ("scene", "info", "a.maqs", "--json", "{}"), (*DENSEPOSE[:-1], "{}", "a.jpg", "--overlay"),
-    ("play", "a.maqrec", "--no-picture", "--json", "{}"), (*HEAD, "--save", "{}"),
+    ("play", "a.maqrec", "--no-image", "--json", "{}"), (*HEAD, "--save", "{}"),
 )  # fmt: skip
 NAMES: tuple[bytes, ...] = (
     b"a b", b"a\nb", b"a\tb", b"\x1b[31mred", b"\xff\xfe", b"caf\xe9", "ä€😀".encode(), "\u202egpj".encode(), b"%41",

@@ -34,7 +34,7 @@ OTHER_KINDS = {
 
 
 def _run(index: int, name: str) -> tuple[str, ...]:
-    return (("play", name, "--no-picture", "--seconds", "1") if index % 4 == 3 else
+    return (("play", name, "--no-image", "--seconds", "1") if index % 4 == 3 else
             ("record", name, "a.maqrec", "--frames", "1") if index % 4 == 2 else (*DENSEPOSE, name))  # fmt: skip
 
 

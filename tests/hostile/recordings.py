@@ -15,7 +15,7 @@ FIELDS = ("magic", "head_check", "timestamp_ns", "sequence", "encoding", "width_
           "depth_height_px", "predicted_us", "picture_bytes", "payload_check")  # fmt: skip
 PLAYS = (
     (*DENSEPOSE, "rec:a.maqrec"),
-    ("play", "a.maqrec", "--no-picture", "--seconds", "1", "--json", "a.json"),
+    ("play", "a.maqrec", "--no-image", "--seconds", "1", "--json", "a.json"),
     ("record", "a.maqrec", "b.maqrec", "--frames", "8"),
 )
 

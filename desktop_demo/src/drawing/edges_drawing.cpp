@@ -30,7 +30,7 @@ double range_m(const double* point_m) { return std::hypot(point_m[0], point_m[1]
 std::string text_of(const maq_edges_box& box) {
   std::string text;
   for (size_t i = 0; i < 3; ++i) {
-    text += formatted("%s%.0f ± %.0f", i == 0 ? "" : " x ", 1e3 * box.size_m[i], 1e3 * box.plus_minus_m[i]);
+    text += formatted("%s%.0f ± %.0f", i == 0 ? "" : " x ", 1e3 * box.size_m[i], 1e3 * box.size_tolerance_m[i]);
   }
   return text + " mm";
 }
@@ -98,7 +98,7 @@ void EdgesDrawing::lengths() const {
     for (size_t axis = 0; axis < 3; ++axis) {
       if (!(lines.labels[axis][2] > 0)) continue;
       label(on_screen(lines.labels[axis].data()),
-            formatted("%.0f ± %.0f mm", 1e3 * box.size_m[axis], 1e3 * box.plus_minus_m[axis]),
+            formatted("%.0f ± %.0f mm", 1e3 * box.size_m[axis], 1e3 * box.size_tolerance_m[axis]),
             colour_of(maquette::kBoxColour));
     }
   }

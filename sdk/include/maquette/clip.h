@@ -1,4 +1,4 @@
-/* Clips: pictures in a video file for any player. To keep frames exactly, with their times, use a recorder
+/* Clips: images in a video file for any player. To keep frames exactly, with their times, use a recorder
  * (recorder.h). */
 #ifndef MAQUETTE_CLIP_H_
 #define MAQUETTE_CLIP_H_
@@ -11,28 +11,26 @@ extern "C" {
 
 typedef struct maq_clip maq_clip;
 
-/* Begins a video file: MPEG-4 in .mp4 or Motion JPEG in .avi, by the path's extension. It is written under another name
- * in the same folder, which must exist; maq_clip_finish renames it to `path` atomically. `fps`: pictures a second, 0.01
- * to 1000, rounded to three decimals, above 65.5 to four digits. `*clip` is the caller's, to be given to
- * maq_clip_destroy.
+/* Begins a video file: MPEG-4 for .mp4, Motion JPEG for .avi. It is written under another name in the same folder,
+ * which must exist. maq_clip_finish renames it to `path` atomically. `fps`: images a second, 0.01 to 1000, rounded to
+ * three decimals, above 65.5 to four digits. The caller owns `*clip`: free it with maq_clip_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
  * (libmaquette_files.so is missing). May block while libraries are opened. */
 MAQ_API maq_status maq_clip_create(maq_context* context, const char* path, double fps, maq_clip** clip);
 
-/* Adds a picture; the frame is not kept. All have the size of the first, at least 2 x 2; an odd width or height
- * loses its last column or row. Each is shown for `1 / fps` seconds: timestamps are ignored.
+/* Adds an image and does not keep the frame. All images have the size of the first, at least 2 x 2. An odd width or
+ * height loses its last column or row. Each image is shown for 1 / fps seconds: timestamps are ignored.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (another size, or the clip is finished), MAQ_ERROR_IMAGE_SIZE
- * (too small), MAQ_ERROR_UNSUPPORTED (a depth image; with the first picture also: this build cannot write that kind
- * of file, or not of that size; try the other extension), MAQ_ERROR_UNWRITABLE (the disk is full already). Blocks
- * while it is encoded. */
+ * (too small), MAQ_ERROR_UNSUPPORTED (a depth image; or this build cannot write this kind of file or this size: try the
+ * other extension), MAQ_ERROR_UNWRITABLE (the disk is full). Blocks while it encodes. */
 MAQ_API maq_status maq_clip_add_frame(maq_clip* clip, const maq_frame* frame);
 
 /* Completes the file; nothing can be added afterwards. Only this call tells whether the whole file reached the disk.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (nothing was added), MAQ_ERROR_UNWRITABLE (the disk is full; a
- * former file of that name stays). Blocks until the file is on the disk. */
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (nothing was added), MAQ_ERROR_UNWRITABLE (the disk is full; an
+ * older file of that name stays). Blocks until the file is on the disk. */
 MAQ_API maq_status maq_clip_finish(maq_clip* clip);
 
-/* Frees the clip (NULL is fine); an unfinished file is removed.
+/* Frees the clip (NULL is fine) and removes an unfinished file.
  * Once for each clip, from any thread. May block briefly. */
 MAQ_API void maq_clip_destroy(maq_clip* clip);
 

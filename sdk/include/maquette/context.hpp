@@ -1,4 +1,4 @@
-// Contexts, errors, and who owns what, for C++17; a part of maquette.hpp.
+// Contexts, errors and ownership of handles, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_CONTEXT_HPP_
 #define MAQUETTE_CONTEXT_HPP_
 
@@ -20,7 +20,7 @@ class Error : public std::runtime_error {
   maq_status status_;
 };
 
-// Throws the error of this thread's latest call when `status` is one.
+// Throws the error of this thread's latest call unless `status` is MAQ_OK.
 inline void check(maq_status status) {
   if (status != MAQ_OK) throw Error(status, maq_last_error(nullptr));
 }

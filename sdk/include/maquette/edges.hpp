@@ -1,4 +1,4 @@
-// Edges of depth frames: fields, curves, boxes, several views as one, for C++17; a part of maquette.hpp.
+// Edges of depth frames: fields, curves, boxes and fusion of views, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_EDGES_HPP_
 #define MAQUETTE_EDGES_HPP_
 
@@ -32,10 +32,10 @@ inline maq_edges_fusion_config default_edges_fusion_config() {
   return config;
 }
 
-// Curves of a result, which may be released before them.
+// The curves of a result. They may outlive it.
 class EdgesCurves {
  public:
-  // Takes over curves of the C API.
+  // Takes ownership of curves from the C API.
   explicit EdgesCurves(maq_edges_curves* curves) : owner_(curves) {}
   // Refers to the curves in a pipeline's result.
   explicit EdgesCurves(PartOf<maq_edges_curves> part)
@@ -43,14 +43,14 @@ class EdgesCurves {
 
   maq_edges_curves* get() const { return owner_.get(); }
 
-  // Their pointers are this object's.
+  // The pointers are valid as long as this object.
   std::vector<maq_edges_curve> curves() const {
     return items(maq_edges_curves_get_curve_count, maq_edges_curves_get_curve);
   }
   std::vector<maq_edges_corner> corners() const {
     return items(maq_edges_curves_get_corner_count, maq_edges_curves_get_corner);
   }
-  // The largest first.
+  // Sorted by volume, the largest first.
   std::vector<maq_edges_box> boxes() const { return items(maq_edges_curves_get_box_count, maq_edges_curves_get_box); }
 
   maq_edges_curves_stats stats() const {
@@ -93,7 +93,7 @@ class EdgesCurves {
 
 class EdgesResult {
  public:
-  // Takes over a result of the C API.
+  // Takes ownership of a result from the C API.
   explicit EdgesResult(maq_edges_result* result) : owner_(result) { read_field(); }
   // Refers to the output in a pipeline's result.
   explicit EdgesResult(PartOf<maq_edges_result> part)
@@ -106,9 +106,9 @@ class EdgesResult {
   int32_t width_px() const { return field_.width_px; }
   int32_t height_px() const { return field_.height_px; }
 
-  // width_px() * height_px() values, row by row.
+  // Planes of width_px() * height_px() values, row by row.
   const float* distance_r() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_DISTANCE)); }
-  const float* spread_r() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_SPREAD)); }
+  const float* expected_error_r() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_EXPECTED_ERROR)); }
   const uint8_t* kind() const { return static_cast<const uint8_t*>(plane(MAQ_EDGES_PLANE_KIND)); }
   const float* depth_m() const { return static_cast<const float*>(plane(MAQ_EDGES_PLANE_DEPTH)); }
 
@@ -131,9 +131,8 @@ class EdgesResult {
     return EdgesCurves(curves);
   }
 
-  void save(const std::string& folder, const std::string& stem) const {
-    check(maq_edges_result_save(get(), folder.c_str(), stem.c_str()));
-  }
+  // Writes <path>_distance.png, <path>_kind.png and <path>_edges.json.
+  void save(const std::string& path) const { check(maq_edges_result_save(get(), path.c_str())); }
 
  private:
   void read_field() {
@@ -155,23 +154,24 @@ class EdgesResult {
 class Edges {
  public:
   Edges(const Context& context, const maq_edges_config& config) { create(context, config); }
-  // The bundle installed with the library.
+  // Loads the bundle installed with the library.
   explicit Edges(const Context& context) { create(context, default_edges_config()); }
   Edges(const Context& context, const std::string& bundle_path) {
     maq_edges_config config = default_edges_config();
-    config.bundle_path = bundle_path.c_str();
+    config.model.bundle_path = bundle_path.c_str();
     create(context, config);
   }
 
   maq_edges* get() const { return owner_.get(); }
 
-  EdgesResult run(const Frame& frame, const maq_intrinsics& intrinsics) {
+  // The frame carries depth and intrinsics.
+  EdgesResult run(const Frame& frame) {
     maq_edges_result* result = nullptr;
-    check(maq_edges_run(get(), frame.get(), &intrinsics, &result));
+    check(maq_edges_run(get(), frame.get(), &result));
     return EdgesResult(result);
   }
 
-  // From any thread: the run that runs, or else the next, throws Error with MAQ_CANCELLED.
+  // From any thread: the running call, or else the next one, throws Error with MAQ_CANCELLED.
   void cancel() { check(maq_edges_cancel(get())); }
 
  private:
@@ -184,7 +184,7 @@ class Edges {
   Owner<maq_edges, maq_edges_destroy> owner_;
 };
 
-// Edges of several views as one: see edges_fusion.h.
+// Joins the edges of several views (edges_fusion.h).
 class EdgesFusion {
  public:
   explicit EdgesFusion(const Context& context, const maq_edges_fusion_config& config = default_edges_fusion_config()) {

@@ -13,26 +13,26 @@ namespace maquette {
 
 class Frame {
  public:
-  // Takes over a frame of the C API.
+  // Takes ownership of a frame from the C API.
   explicit Frame(maq_frame* frame) : owner_(frame) {}
   // Refers to the frame of a pipeline's result.
   explicit Frame(PartOf<maq_frame> part) : owner_(const_cast<maq_frame*>(part.handle), {std::move(part.whole)}) {}
 
-  // Pixels of the app, which must stay until the frame is gone.
+  // Wraps pixels of the app, which must outlive the frame.
   Frame(const Context& context, const maq_frame_desc& desc) {
     maq_frame* made = nullptr;
     check(maq_frame_wrap(context.get(), &desc, nullptr, nullptr, &made));
     owner_.reset(made);
   }
 
-  // An image file in memory, of `size_bytes` at `data`, which is not needed afterwards.
+  // Decodes an image file in memory: `size_bytes` at `data`, which may be freed afterwards.
   static Frame decode(const Context& context, const void* data, size_t size_bytes) {
     maq_frame* made = nullptr;
     check(maq_frame_decode(context.get(), data, size_bytes, &made));
     return Frame(made);
   }
 
-  // A copy of an image in planes of Y, U and V, which are not needed afterwards.
+  // Copies an image in planes of Y, U and V, which may be freed afterwards.
   static Frame convert_yuv(const Context& context, const maq_yuv_image& image) {
     maq_frame* made = nullptr;
     check(maq_frame_convert_yuv(context.get(), &image, &made));
@@ -48,16 +48,22 @@ class Frame {
     return desc;
   }
 
+  // Returns nothing when they are unknown.
+  std::optional<maq_intrinsics> intrinsics() const {
+    const maq_intrinsics known = desc().intrinsics;
+    return known.width_px > 0 ? std::optional(known) : std::nullopt;
+  }
+
   maq_frame_origin origin() const {
     maq_frame_origin origin{};
     origin.struct_size = sizeof origin;
     check(maq_frame_get_origin(get(), &origin));
     return origin;
   }
-  // Made up by a predictor or a concealer: no camera took it.
+  // True for a frame from a predictor or a concealer.
   bool is_predicted() const { return origin().kind == MAQ_FRAME_PREDICTED; }
 
-  // Nothing when the frame came without depth.
+  // Returns nothing for a frame without depth.
   std::optional<maq_frame_desc> depth() const {
     maq_frame_desc desc{};
     desc.struct_size = sizeof desc;
@@ -71,7 +77,7 @@ class Frame {
     check(maq_frame_copy_pixels(get(), format, pixels, stride_bytes, size_bytes));
   }
 
-  // In BGR.
+  // Returns a copy in BGR.
   Frame resized(int32_t width_px, int32_t height_px) const {
     maq_frame* made = nullptr;
     check(maq_frame_resize(get(), width_px, height_px, &made));

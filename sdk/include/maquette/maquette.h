@@ -7,12 +7,30 @@
  *   maq_densepose_result* r;   maq_densepose_run(densepose, frame, &r);
  *   ... read the result ...    then release r and frame, destroy the rest, in any order.
  *
- * Rules of the whole API:
+ * Life cycle. All systems work in the same way:
  *
- * - Names are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing: `_get_<thing>_count` returns a number,
- *   `_get_<thing>(…, index, &thing)` one item. Enum values begin with the noun of their type; bounds are min and max.
- * - Each verb that returns an object is paired with one that gives the object back. Call it once for each object, in
- *   any order; NULL is fine:
+ *   maq_X_config_init   fills a config with the defaults
+ *   maq_X_create        makes the object, loads its networks
+ *   run, push           takes a frame and returns a result, an object of its own
+ *   _get_stats          returns times and counts of the result
+ *   _save(path)         writes the result to a file
+ *   _release, _destroy  give results and objects back
+ *
+ *   _cancel(object) ends a running call, or else the next one. It may come from any thread. The call returns
+ *   MAQ_CANCELLED. A progress callback cancels by returning 0.
+ *
+ * Names.
+ *
+ * - Functions are maq_<object>_<verb>_<noun>. `_get_…` reads and changes nothing. `_get_<thing>_count` returns a
+ *   number, `_get_<thing>(…, index, &thing)` returns one item.
+ * - Types and enum values begin with the name of their system. The bounds of a range are min and max.
+ * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
+ * - A parameter `count` after an array is the capacity of that array, in elements.
+ *
+ * Ownership.
+ *
+ * - Each function that returns an object has a partner that takes the object back. Call the partner once for each
+ *   object, in any order. NULL is fine.
  *
  *     _create, _open, _open_memory, _build,   _destroy   contexts, sources, lists, models, builders, captures, scenes,
  *     _fit, _scale_…, _finish                            heads, meshes, renderers, writers
@@ -20,40 +38,57 @@
  *     _wrap, _decode, _resize, _convert_yuv,
  *     _predict
  *
- *   (_finish of a builder returns a scene; _finish of a clip or a recorder completes its file and returns nothing.)
- *   What `_get_…` returns belongs to the object that it was called with.
- * - Every call that can fail returns maq_status and writes its result through its last argument only when it returns
- *   MAQ_OK. maq_last_error(NULL) is the sentence that says what was wrong and what to do.
- * - Structs that may grow begin with struct_size, which the caller sets to sizeof the struct; the `_init` functions do
- *   so and fill in the defaults. A NULL config means the defaults. Configs are copied.
- * - Yes or no is an int32_t, 1 or 0. Fields and parameters with values of an enum have the enum's
- *   type, 4 bytes.
- * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
- * - Files that are saved appear atomically, in folders that exist. Of a symbolic link, the file that it leads
- *   to is replaced; a character device, a pipe or /dev/stdout gets the whole at once (clips and recordings need files).
- * - No C++ exception leaves the library, and it never ends the process: nor do the signals of a full disk or of a pipe
- *   without a reader (SIGXFSZ, SIGPIPE) while it writes. What a callback throws is caught.
- * - Where the system starts fewer threads than asked for (ulimit -u, limits of containers), networks and renderers run
- *   on those there are, with a warning in the log; live sources and pipelines, which need one, return
- *   MAQ_ERROR_OUT_OF_MEMORY.
- * - Objects belong to the process that made them. In a child of fork() they have no threads, and their files and
- *   devices are the parent's: each call on one returns MAQ_ERROR_INVALID_ARGUMENT at once, and giving it back does
- *   nothing. A child makes a context and all else anew; that works if no other thread of the parent was in a call of
- *   the library during fork(). Cameras of libcamera and DepthAI need exec() too once the parent has used one.
- * - Each function names its thread level: "any thread" may be called at any time from any thread; "one at a time" may
- *   be called from any thread, but not for the same handle from two threads at once.
- * - Misuse is MAQ_ERROR_INVALID_ARGUMENT where the library can see it: an object of another type, one that was given
- *   back before, two calls at once on an object whose functions run one at a time, also from a callback of the first.
- *   A `_destroy` or `_release` for which that holds changes nothing, and maq_last_error(NULL) says why. The
- *   library cannot see, and the behaviour is undefined for:
+ *   The _finish of a builder returns a scene. The _finish of a clip or a recorder completes its file and returns
+ *   nothing.
+ * - A pointer from `_get_…` belongs to the object that it came from.
  *
- *     - a pointer that is not of this library; a shorter array or buffer than was said;
- *     - an object that was given back so long ago that its memory has become another's: those of a pool until the pool
- *       lends them again, or is gone, and the latest 64 others are remembered;
- *     - an object that is given back while a call of "any thread" level uses it, or a call to which it is an argument,
- *       on another thread, unless the function's comment allows it;
+ * Structs.
+ *
+ * - A struct with struct_size must have exactly the size of this library's struct. Set struct_size to sizeof the
+ *   struct, or use the `_init` function. Headers and library of the same minor version agree on all sizes.
+ * - 0 means "default" in every field of a config. "Off" is an enum value. Yes or no is an int32_t, 1 or 0; its
+ *   default is 0, no. A NULL config means the defaults. Configs are copied.
+ * - `model` (maq_model_options) is the first member of each config whose system has networks.
+ *
+ * Errors.
+ *
+ * - Each call that can fail returns maq_status. It writes its result through its last argument only when it returns
+ *   MAQ_OK. maq_last_error(NULL) returns a sentence: what was wrong, and what to do.
+ * - No C++ exception leaves the library, and the library never ends the process. The signals of a full disk
+ *   (SIGXFSZ) and of a pipe without a reader (SIGPIPE) do not end it either while the library writes. Exceptions of
+ *   callbacks are caught.
+ * - If the system starts fewer threads than requested (ulimit -u, limits of containers), networks and renderers use
+ *   the threads they get, and the log has a warning. Live sources and pipelines need one thread. Without it they
+ *   return MAQ_ERROR_OUT_OF_MEMORY.
+ * - Misuse returns MAQ_ERROR_INVALID_ARGUMENT where the library can detect it: an object of another type, an object
+ *   that was given back before, two calls at once on a handle for one call at a time. A `_destroy` or
+ *   `_release` with such an object changes nothing, and maq_last_error(NULL) says why. The library
+ *   cannot detect these cases, and the behaviour is undefined:
+ *
+ *     - a pointer that is not from this library; an array or a buffer that is shorter than stated;
+ *     - an object that was given back so long ago that its memory is used again: an object of a pool after the pool
+ *       has lent it again or is gone; another object after 64 more were given back;
+ *     - giving back an object while another thread uses it in an "any thread" call or as an argument, unless the
+ *       function's comment allows it;
  *     - memory of the app that changes while a call, or a frame made by maq_frame_wrap, reads it;
  *     - a callback that does not return (longjmp, the end of its thread).
+ *
+ * Threads and processes.
+ *
+ * - Each function states its thread level. "Any thread" may be called at any time from any thread. "One at a time"
+ *   may be called from any thread, but not from two threads at once for the same handle.
+ * - Objects belong to the process that made them. In a child of fork() they have no threads, and their files and
+ *   devices belong to the parent. Each call on such an object returns MAQ_ERROR_INVALID_ARGUMENT at once. Giving it
+ *   back does nothing.
+ * - A child of fork() creates its own context and objects. This works if no other thread of the parent was inside
+ *   the library during fork(). After the parent has used a camera of libcamera or DepthAI, such cameras need exec()
+ *   too.
+ *
+ * Files.
+ *
+ * - Saved files appear atomically, in folders that exist. A symbolic link stays, and the file behind it is
+ *   replaced. A character device, a pipe or /dev/stdout receives the whole content at once. Clips and recordings
+ *   need regular files.
  */
 #ifndef MAQUETTE_MAQUETTE_H_
 #define MAQUETTE_MAQUETTE_H_

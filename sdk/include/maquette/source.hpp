@@ -35,7 +35,7 @@ class Source {
     return info;
   }
 
-  // Nothing when they are not known.
+  // Returns nothing when they are unknown. Frames of the source carry them, too.
   std::optional<maq_intrinsics> intrinsics() const {
     maq_intrinsics intrinsics{};
     const maq_status status = maq_source_get_intrinsics(get(), &intrinsics);
@@ -44,20 +44,20 @@ class Source {
     return intrinsics;
   }
 
-  // Nothing when the camera does not have it.
-  std::optional<maq_control_info> control(maq_control which) const {
-    maq_control_info info{};
+  // Returns nothing when the camera does not have the control.
+  std::optional<maq_source_control_info> control(maq_source_control which) const {
+    maq_source_control_info info{};
     info.struct_size = sizeof info;
     const maq_status status = maq_source_get_control(get(), which, &info);
     if (status == MAQ_ERROR_UNSUPPORTED) return std::nullopt;
     check(status);
     return info;
   }
-  void set_control(maq_control which, double value) { check(maq_source_set_control(get(), which, value)); }
+  void set_control(maq_source_control which, double value) { check(maq_source_set_control(get(), which, value)); }
 
   void seek(int64_t time_ns) { check(maq_source_seek(get(), time_ns)); }
 
-  // Nothing for sources other than cameras; readable while next() would not wait.
+  // Returns nothing for sources that are not live. Readable when next() would not wait.
   std::optional<int> event_fd() const {
     int32_t fd = -1;
     const maq_status status = maq_source_get_event_fd(get(), &fd);
@@ -66,10 +66,10 @@ class Source {
     return fd;
   }
 
-  // From any thread: next() returns nothing, now and later.
+  // From any thread: next() returns nothing from now on.
   void stop() { check(maq_source_stop(get())); }
 
-  // Nothing after the last frame, and after stop(). Throws Error with MAQ_TIMEOUT when none came in time.
+  // Returns nothing after the last frame and after stop(). Throws Error with MAQ_TIMEOUT if no frame came in time.
   std::optional<Frame> next(int64_t timeout_ns = MAQ_WAIT_FOREVER) {
     maq_frame* frame = nullptr;
     const maq_status status = maq_source_acquire_frame(get(), timeout_ns, &frame);
@@ -84,7 +84,7 @@ class Source {
 
 class Recorder {
  public:
-  // `source` may be NULL, and so may `config`.
+  // `source` and `config` may be NULL.
   Recorder(const Context& context, const std::string& path, const Source* source = nullptr,
            const maq_recorder_config* config = nullptr) {
     maq_recorder* made = nullptr;

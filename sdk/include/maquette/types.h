@@ -111,8 +111,8 @@ MAQ_API const char* maq_status_get_name(maq_status status);
  * Any thread, while `handle` is alive. Does not fail or block. */
 MAQ_API const char* maq_last_error(const void* handle);
 
-/* Return the version of the library found at run time ("0.3.0"), the git commit it was built from, and the options
- * it was built with ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
+/* Return the version of the library found at run time ("0.3.0"), its git commit, and its build options
+ * ("release, g++ 12.2"). The texts are static. Any thread. Do not fail or block. */
 MAQ_API const char* maq_get_sdk_version(void);
 MAQ_API const char* maq_get_git_commit(void);
 MAQ_API const char* maq_get_build_options(void);

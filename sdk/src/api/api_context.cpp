@@ -8,7 +8,6 @@ namespace {
 maq_context_config default_context_config() {
   maq_context_config config{};
   config.struct_size = sizeof config;
-  config.log_level = MAQ_LOG_WARNING;
   return config;
 }
 
@@ -61,14 +60,15 @@ maq_status maq_context_config_init(maq_context_config* config, uint32_t struct_s
 
 maq_status maq_context_create(uint32_t header_version, const maq_context_config* given, maq_context** context) {
   return guarded(nullptr, __func__, [&] {
-    // First of all: with other headers nothing else can be trusted.
+    // This check comes first: with other headers, no other argument can be trusted.
     check_header_version(header_version);
     require_argument(context, "context");
     const maq_context_config config = read_config(given, "config", default_context_config());
     require_range("config.log_level", number_in(config.log_level), int32_t(MAQ_LOG_OFF), int32_t(MAQ_LOG_DEBUG));
+    const maq_log_level level = config.log_level == MAQ_LOG_DEFAULT ? MAQ_LOG_WARNING : config.log_level;
     const char* library = config.onnxruntime_library;
-    *context = new maq_context(std::make_shared<ContextState>(
-        Log(config.log_level, config.log_callback, config.log_user_data), library == nullptr ? "" : library));
+    *context = new maq_context(std::make_shared<ContextState>(Log(level, config.log_callback, config.log_user_data),
+                                                              library == nullptr ? "" : library));
     return MAQ_OK;
   });
 }

@@ -4,12 +4,23 @@
 #include "image/convert.h"
 #include "image/files/depth_file.h"
 #include "image/files/image_file.h"
+#include "image/geometry/intrinsics.h"
 #include "image/geometry/resize.h"
 #include "image/yuv_planes.h"
 
 using namespace maq;
 
 namespace {
+
+// Returns the intrinsics for an image of the frame: its own, or the depth image that shows the same view. `width_px` 0:
+// unknown.
+maq_intrinsics intrinsics_for(const ImageView& image, const Frame& frame) {
+  const maq_intrinsics& known = frame.intrinsics;
+  if (known.width_px <= 0 || known.height_px <= 0) return {};
+  if (known.width_px == image.width_px && known.height_px == image.height_px) return known;
+  const bool is_of_image = known.width_px == frame.image.width_px && known.height_px == frame.image.height_px;
+  return is_of_image ? resized(known, image.width_px, image.height_px) : known;
+}
 
 maq_frame_desc description(const ImageView& image, const Frame& frame) {
   maq_frame_desc desc{};
@@ -23,12 +34,21 @@ maq_frame_desc description(const ImageView& image, const Frame& frame) {
   desc.timestamp_ns = frame.timestamp_ns;
   desc.clock = frame.clock;
   desc.sequence = frame.sequence;
+  desc.intrinsics = intrinsics_for(image, frame);
   return desc;
+}
+
+void require_own_size(const maq_frame_desc& desc) {
+  const maq_intrinsics& camera = desc.intrinsics;
+  const bool is_unknown = camera.width_px == 0 && camera.height_px == 0;
+  if (is_unknown || (camera.width_px == desc.width_px && camera.height_px == desc.height_px)) return;
+  throw ArgumentError("desc.intrinsics are for ", camera.width_px, " x ", camera.height_px,
+                      " pixels, but the frame has ", desc.width_px, " x ", desc.height_px,
+                      "; scale them to its size, or set their size to 0 x 0 if they are unknown.");
 }
 
 maq_yuv_image default_yuv_image() {
   maq_yuv_image image{};
-  image.is_full_range = 1;
   image.clock = MAQ_CLOCK_MONOTONIC;
   return image;
 }
@@ -49,11 +69,13 @@ maq_status maq_frame_wrap(maq_context* context, const maq_frame_desc* given,
     require_argument(frame, "frame");
     const maq_frame_desc desc = read_config(given, "desc", maq_frame_desc{});
     require_range("desc.clock", number_in(desc.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
+    require_own_size(desc);
     auto handle = std::make_unique<maq_frame>();
     handle->frame.image = checked_image_view(desc);
     handle->frame.timestamp_ns = desc.timestamp_ns;
     handle->frame.clock = desc.clock;
     handle->frame.sequence = desc.sequence;
+    handle->frame.intrinsics = desc.intrinsics;
     handle->release_callback = release_callback;
     handle->user_data = user_data;
     *frame = handle.release();
@@ -71,12 +93,12 @@ maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_image* imag
     require_argument(image, "image");
     require_argument(frame, "frame");
     const maq_yuv_image given = read_config(image, "image", default_yuv_image());
-    require_range("image.is_full_range", given.is_full_range, 0, 1);
+    require_range("image.is_video_range", given.is_video_range, 0, 1);
     require_range("image.clock", number_in(given.clock), int32_t(MAQ_CLOCK_MEDIA), int32_t(MAQ_CLOCK_MONOTONIC));
     if (given.rotation_deg % 90 != 0 || given.rotation_deg < 0 || given.rotation_deg > 270) {
       throw ArgumentError("image.rotation_deg is ", given.rotation_deg, ", but must be 0, 90, 180 or 270.");
     }
-    YuvImage from{given.width_px, given.height_px, {}, given.is_full_range == 1};
+    YuvImage from{given.width_px, given.height_px, {}, given.is_video_range == 0};
     for (int i = 0; i < 3; ++i) {
       from.planes[i] = {given.planes[i], given.size_bytes[i], given.stride_bytes[i], given.pixel_stride_bytes[i]};
     }
@@ -150,7 +172,7 @@ maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc) {
   return guarded(frame, __func__, [&] {
     require_argument(frame, "frame");
     const ImageView* depth = depth_of(frame->frame);
-    if (depth == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame came without depth.");
+    if (depth == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame has no depth.");
     write_struct(desc, "desc", description(*depth, frame->frame));
     return MAQ_OK;
   });
@@ -161,7 +183,8 @@ maq_status maq_frame_get_dma_buf(const maq_frame* frame, int32_t* fd) {
     require_argument(frame, "frame");
     require_argument(fd, "fd");
     const int found = frame->frame.lease.dma_buf();
-    if (found < 0) throw Error(MAQ_ERROR_UNSUPPORTED, "The frame's memory cannot be had as a dma-buf; use its planes.");
+    if (found < 0)
+      throw Error(MAQ_ERROR_UNSUPPORTED, "The frame's memory is not available as a dma-buf; use its planes.");
     *fd = found;
     return MAQ_OK;
   });
@@ -188,6 +211,7 @@ maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t he
     handle->frame.clock = frame->frame.clock;
     handle->frame.sequence = frame->frame.sequence;
     handle->frame.origin = frame->frame.origin;
+    handle->frame.intrinsics = intrinsics_for(handle->frame.image, frame->frame);
     *resized = handle.release();
     return MAQ_OK;
   });

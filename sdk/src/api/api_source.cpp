@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -8,23 +9,20 @@ using namespace maq;
 
 namespace {
 
-constexpr const char* kConcealed = "A concealer takes the frames of this source; acquire them from it, or destroy it.";
+constexpr const char* kConcealed =
+    "A concealer takes the frames of this source; acquire them from the concealer, or destroy it.";
 
 constexpr uint32_t kLargestPoolSize = 64;
 
 maq_source_config default_source_config() {
   maq_source_config config{};
   config.struct_size = sizeof config;
-  const SourceSettings defaults;
-  config.frame_pool_size = uint32_t(defaults.pool_size);
-  config.queue_length = uint32_t(defaults.queue_length);
-  config.stall_ms = defaults.stall_ms;
-  config.reconnect_ms = defaults.reconnect_ms;
   return config;
 }
 
-void require_control(const maq_control& control) {
-  require_range("control", number_in(control), int32_t(MAQ_CONTROL_AUTO_EXPOSURE), int32_t(MAQ_CONTROL_BRIGHTNESS));
+void require_control(const maq_source_control& control) {
+  require_range("control", number_in(control), int32_t(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE),
+                int32_t(MAQ_SOURCE_CONTROL_BRIGHTNESS));
 }
 
 }  // namespace
@@ -37,18 +35,18 @@ maq_source_config read_source_config(const maq_source_config* given, const char*
 
 SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log) {
   const auto field = [name](const char* of) { return concatenate(name, ".", of); };
-  require_range(field("frame_pool_size"), config.frame_pool_size, 1u, kLargestPoolSize);
-  require_range(field("queue_length"), config.queue_length, 1u, kLargestPoolSize);
-  require_range(field("stall_ms"), config.stall_ms, 50, 60000);
-  require_range(field("reconnect_ms"), config.reconnect_ms, 0, 86400000);
+  require_range(field("frame_pool_size"), config.frame_pool_size, 0u, kLargestPoolSize);
+  require_range(field("queue_length"), config.queue_length, 0u, kLargestPoolSize);
+  if (config.stall_ms != 0) require_range(field("stall_ms"), config.stall_ms, 50, 60000);
+  require_range(field("reconnect_ms"), config.reconnect_ms, MAQ_NO_RECONNECT, 86400000);
   require_range(field("real_time"), config.real_time, 0, 1);
   require_range(field("loop"), config.loop, 0, 1);
   if (config.max_side_px != 0) require_range(field("max_side_px"), config.max_side_px, 1, MAQ_MAX_SIDE_PX);
   SourceSettings settings;
-  settings.pool_size = int(config.frame_pool_size);
-  settings.queue_length = int(config.queue_length);
-  settings.stall_ms = config.stall_ms;
-  settings.reconnect_ms = config.reconnect_ms;
+  if (config.frame_pool_size != 0) settings.pool_size = int(config.frame_pool_size);
+  if (config.queue_length != 0) settings.queue_length = int(config.queue_length);
+  if (config.stall_ms != 0) settings.stall_ms = config.stall_ms;
+  if (config.reconnect_ms != 0) settings.reconnect_ms = std::max(config.reconnect_ms, 0);
   settings.real_time = config.real_time == 1;
   settings.loop = config.loop == 1;
   settings.max_side_px = config.max_side_px;
@@ -72,7 +70,7 @@ maq_status maq_source_create(maq_context* context, const char* uri, const maq_so
     require_argument(source, "source");
     const maq_source_config config = read_source_config(given, "config");
     const SourceSettings settings = source_settings(config, "config", context->state->log());
-    *source = new maq_source(uri, open_source(uri, settings), config.frame_pool_size);
+    *source = new maq_source(uri, open_source(uri, settings), size_t(settings.pool_size));
     return MAQ_OK;
   });
 }
@@ -85,7 +83,7 @@ maq_status maq_source_stop(maq_source* source) {
   });
 }
 
-// Ends the calls that wait for a frame.
+// Allowed while another thread waits for a frame: that call returns first.
 void maq_source_destroy(maq_source* source) { destroy(source, "source", __func__, WhileInUse::kAllowed); }
 
 maq_status maq_source_get_info(const maq_source* source, maq_source_info* info) {
@@ -141,13 +139,15 @@ maq_status maq_source_get_intrinsics(const maq_source* source, maq_intrinsics* i
     require_argument(source, "source");
     require_argument(intrinsics, "intrinsics");
     const maq_intrinsics* found = source->source->intrinsics();
-    if (found == nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, "The intrinsics of the source are not known.");
+    if (found == nullptr)
+      throw Error(MAQ_ERROR_UNSUPPORTED,
+                  "The intrinsics of the source are unknown; add fov=60 (degrees) or fx=380 (pixels) to its URI.");
     *intrinsics = *found;
     return MAQ_OK;
   });
 }
 
-maq_status maq_source_get_control(maq_source* source, maq_control control, maq_control_info* info) {
+maq_status maq_source_get_control(maq_source* source, maq_source_control control, maq_source_control_info* info) {
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
     require_argument(info, "info");
@@ -157,7 +157,7 @@ maq_status maq_source_get_control(maq_source* source, maq_control control, maq_c
   });
 }
 
-maq_status maq_source_set_control(maq_source* source, maq_control control, double value) {
+maq_status maq_source_set_control(maq_source* source, maq_source_control control, double value) {
   return guarded(source, __func__, [&] {
     require_argument(source, "source");
     require_control(control);

@@ -3,7 +3,7 @@
 namespace maq {
 namespace {
 
-// Of the thread, so that no call waits for another and no text is freed while it is read.
+// One text for each thread, so that no call waits for another and no text is freed while it is read.
 thread_local std::string latest_error;
 thread_local std::string returned_error;
 

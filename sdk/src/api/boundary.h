@@ -1,4 +1,4 @@
-// What every function of the C API goes through: argument checks, and exceptions turned into status and text.
+// The entry of every function of the C API: checks arguments, and turns exceptions into status and text.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ maq_status guarded(const Handle* handle, const char* function, Body&& body) noex
   }
 }
 
-// Of handles also: that it is one of that type and process, which the app has.
+// Also checks that a handle has this type, belongs to this process and is held by the app.
 template <class T>
 void require_argument(const T* pointer, const char* name) {
   if (pointer == nullptr) throw ArgumentError(name, " is NULL.");
@@ -141,7 +141,7 @@ void require_provider(const Name& name, const maq_provider& provider) {
   require_range(name, number_in(provider), int32_t(MAQ_PROVIDER_CPU), int32_t(MAQ_PROVIDER_NNAPI));
 }
 
-// Of configs that take MAQ_THREADS_MEASURED.
+// For configs that accept MAQ_THREADS_MEASURED.
 template <class Name>
 void require_threads(const Name& name, int32_t threads, int32_t max) {
   if (threads == MAQ_THREADS_MEASURED || (threads >= 0 && threads <= max)) return;

@@ -10,11 +10,6 @@
 
 namespace maq {
 
-// Without the distortion.
-inline Intrinsics intrinsics_of(const maq_intrinsics& given) {
-  return {given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
-}
-
 inline bool is_distorted(const maq_intrinsics& given) {
   return std::any_of(std::begin(given.distortion), std::end(given.distortion), [](double k) { return k != 0; });
 }
@@ -28,11 +23,11 @@ inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   return camera;
 }
 
-// Of a picture to be rendered.
+// Of an image to be rendered.
 inline PinholeCamera undistorted_pinhole_of(const maq_pinhole_camera& given) {
   require_struct_size("camera", given.struct_size, sizeof(maq_pinhole_camera));
   if (is_distorted(given.intrinsics)) {
-    throw ArgumentError("camera.intrinsics.distortion is not 0; pictures are rendered without distortion.");
+    throw ArgumentError("camera.intrinsics.distortion is not 0; images are rendered without distortion.");
   }
   return pinhole_of(given);
 }

@@ -44,7 +44,7 @@ class HandleState {
  public:
   explicit HandleState(HandleKind kind) : HandleState(kind, 0) {}
 
-  // Of any kind.
+  // For any kind of handle.
   bool is_held() const;
   bool is_held_as(HandleKind kind) const {
     return (word_.load(std::memory_order_relaxed) & ~(kInUse | kPart)) == held(kind);

@@ -11,10 +11,10 @@
 
 namespace maq {
 
-// The caller's config on top of the defaults. `name` begins error texts.
+// Returns the caller's config, or the defaults for NULL. `name` begins error texts.
 maq_source_config read_source_config(const maq_source_config* given, const char* name);
 
-// Throws ArgumentError for what is out of range; `name` is that of the config.
+// Throws ArgumentError for a value out of range. `name` is the name of the config.
 SourceSettings source_settings(const maq_source_config& config, const char* name, const Log& log);
 
 }  // namespace maq
@@ -41,7 +41,7 @@ struct maq_source : maq::HandleOf<maq::HandleKind::kSource> {
   std::shared_ptr<std::atomic<bool>> is_concealed = std::make_shared<std::atomic<bool>>(false);
   maq::BoundedPool<maq_frame> frames;
   std::atomic<bool> is_stopped{false};
-  std::mutex mutex;  // of the rest
+  std::mutex mutex;  // guards the rest
   std::condition_variable idle;
   int calls = 0;
 };

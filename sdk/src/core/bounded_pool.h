@@ -11,7 +11,7 @@
 
 namespace maq {
 
-// What pools of all types share: once in the library, rather than for each of them.
+// The part common to pools of all types, compiled once instead of for each type.
 class PooledObjects {
  public:
   using Destroy = void (*)(void* object);

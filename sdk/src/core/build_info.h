@@ -1,4 +1,4 @@
-// What this library was built from; the texts come from CMake.
+// Version, commit and options of this build; the texts come from CMake.
 #pragma once
 
 namespace maq {

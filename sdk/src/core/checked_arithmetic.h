@@ -1,5 +1,5 @@
-// Sums and products of sizes that come from outside: strides, counts, offsets. What does not fit is told, never
-// wrapped.
+// Sums and products of sizes that come from outside: strides, counts, offsets. They report an overflow and
+// never wrap.
 #pragma once
 
 #include <optional>

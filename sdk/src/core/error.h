@@ -12,11 +12,11 @@
 
 namespace maq {
 
-// With the numbers of C, whatever the locale of the app: 1234.5, not 1.234,5.
+// Writes numbers in the C locale, for any locale of the app: 1234.5, not 1.234,5.
 template <class... Parts>
 std::string concatenate(const Parts&... parts) {
   std::ostringstream text;
-  text.exceptions(std::ios::badbit);  // what throws without memory, where the text would end early
+  text.exceptions(std::ios::badbit);  // throws without memory; otherwise the text would end early
   text.imbue(std::locale::classic());
   (text << ... << parts);
   return text.str();
@@ -36,16 +36,16 @@ class Error : public std::runtime_error {
 
 inline constexpr char kNoMemory[] = "There is not enough memory. Free memory, or raise the limit of it.";
 
-// The same where there is none even for a text: strings hold so few letters themselves.
+// The text for the case without memory for a longer one: a string stores so few letters inline.
 inline constexpr char kShortNoMemory[] = "Out of memory.";
 
 struct Failure {
   maq_status status;
-  const char* text;  // of the exception, while that lives, or static
+  const char* text;  // valid as long as the exception, or static
 };
 
-// What the exception means that is being handled: to be called in the catch block. MAQ_ERROR_INTERNAL for what the
-// library does not throw itself.
+// Returns the status and text of the exception being handled. Call it in the catch block. Exceptions from outside the
+// library are MAQ_ERROR_INTERNAL.
 inline Failure current_failure() noexcept {
   try {
     throw;

@@ -18,7 +18,7 @@ struct PlaneView {
   size_t stride_bytes = 0;
 };
 
-// Pixels in memory of another owner.
+// A view of pixels in memory of another owner.
 struct ImageView {
   maq_pixel_format format = MAQ_PIXEL_BGR8;
   int width_px = 0;
@@ -64,14 +64,14 @@ class PixelLease {
   int slot_ = 0;
 };
 
-// What a frame was made from that no camera took (maq_frame_origin).
+// The captured frame behind a predicted frame (maq_frame_origin).
 struct FrameOrigin {
   bool is_predicted = false;
   int64_t captured_timestamp_ns = 0;
   uint64_t captured_sequence = 0;
   int64_t horizon_ns = 0;
 
-  // The origin of a frame whose time and number were changed.
+  // Returns the origin for the frame with another time and number.
   FrameOrigin moved_to(int64_t timestamp_ns, uint64_t sequence) const {
     return is_predicted ? FrameOrigin{true, timestamp_ns - horizon_ns, sequence, horizon_ns} : FrameOrigin{};
   }
@@ -83,6 +83,7 @@ struct Frame {
   int64_t timestamp_ns = 0;
   maq_clock clock = MAQ_CLOCK_MEDIA;
   uint64_t sequence = 0;
+  maq_intrinsics intrinsics{};  // camera of the image; width_px 0: unknown
   FrameOrigin origin;
   // Memory of the pixels when the library owns them; kept between uses of a pooled frame.
   std::vector<uint8_t> storage;
@@ -90,7 +91,7 @@ struct Frame {
   // The JPEG image that `image` was decoded from, in the camera's memory; null when it was not a JPEG image.
   const uint8_t* jpeg = nullptr;
   size_t jpeg_bytes = 0;
-  // Of a camera's buffer; empty for pixels in memory of the frame, or of an app.
+  // The lease of a camera's buffer; empty for pixels in memory of the frame or of an app.
   PixelLease lease;
 
   // Keeps the memory of the frame itself, for the next image.
@@ -98,6 +99,7 @@ struct Frame {
     lease.reset();
     jpeg = nullptr;
     depth.width_px = 0;
+    intrinsics = {};
     origin = {};
   }
 
@@ -109,7 +111,7 @@ struct Frame {
 const char* pixel_format_name(maq_pixel_format format);
 int plane_count(maq_pixel_format format);
 inline bool is_depth(maq_pixel_format format) { return format == MAQ_PIXEL_DEPTH16 || format == MAQ_PIXEL_DEPTH32F; }
-// Of a depth frame its own pixels, otherwise what came with the picture; null when there is none.
+// Returns the depth image: the pixels of a depth frame, or the depth that came with a colour frame; null without depth.
 inline const ImageView* depth_of(const Frame& frame) {
   if (is_depth(frame.image.format)) return &frame.image;
   return frame.depth.width_px > 0 ? &frame.depth : nullptr;
@@ -122,7 +124,7 @@ int plane_rows(maq_pixel_format format, int plane, int height_px);
 // more than an array can have. `rows` is at least 1.
 std::optional<size_t> bytes_of_rows(size_t stride_bytes, int rows, size_t row_bytes);
 
-// Of an image whose rows follow one another without padding, and so do its planes.
+// For an image without padding between its rows and planes.
 size_t packed_bytes(maq_pixel_format format, int width_px, int height_px);
 ImageView packed_view(maq_pixel_format format, int width_px, int height_px, const uint8_t* pixels);
 void copy_packed(const ImageView& image, uint8_t* pixels);
@@ -133,7 +135,7 @@ ImageView window_of(const ImageView& image, int x, int y, int width_px, int heig
 // `what` begins the sentence: "photo.jpg" or "The frame".
 void check_image_size(int64_t width_px, int64_t height_px, const std::string& what);
 
-// Throws when the description is not of a readable image; fills in strides that are 0.
+// Throws for the description of an unreadable image; fills in strides that are 0.
 ImageView checked_image_view(const maq_frame_desc& desc);
 
 }  // namespace maq

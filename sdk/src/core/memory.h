@@ -18,8 +18,8 @@ void require_memory(size_t bytes);
 // How much address space a limit of this process leaves (RLIMIT_AS: ulimit -v); SIZE_MAX where there is no limit.
 size_t address_space_left();
 
-// What the thread-local storage of a library takes when a thread first uses it; glibc ends the process where it cannot
-// be had.
+// The memory for the thread-local storage of a library when a thread first uses it. Without it glibc ends the
+// process.
 inline constexpr size_t kThreadLocalBytes = 64 << 10;
 
 }  // namespace maq

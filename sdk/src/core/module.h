@@ -14,8 +14,8 @@
 
 namespace maq {
 
-// What a module exports, by a function without arguments: its version, which must be that of the SDK, and an object
-// whose type both sides know.
+// The export of a module, returned by a function without arguments: its version, which must equal the SDK's version,
+// and an object whose type both sides know.
 struct ModuleExport {
   const char* version;
   void* object;

@@ -12,8 +12,8 @@
 namespace maq {
 namespace {
 
-// What tells how fast a core is, and the fraction of the fastest core's from which one is large. Small cores have a
-// third of the capacity; their frequency is nearer, some two thirds.
+// A measure of a core's speed. A large core has at least min_fraction of the fastest core's value. Small cores have a
+// third of the capacity, but about two thirds of the frequency.
 struct Measure {
   const char* file;
   double min_fraction;
@@ -70,7 +70,7 @@ WorkerThreads::WorkerThreads(int count) {
       threads_.push_back(start_thread("maq worker", [this, worker = this->count()] { stay(worker); }));
     }
   } catch (const Error&) {
-    // Those that are there do the work.
+    // The threads that started do the work.
   } catch (...) {
     stop();
     throw;

@@ -59,7 +59,7 @@ void ActiveWindow::sum_row_of_tiles(const DepthPlane& depth, int row) {
   const int rows = std::min(kTile_px, depth.height_px - row * kTile_px);
   for (int column = 0; column < columns_; ++column) {
     Columns sums{};
-    // Of the frame; what is beyond it is unknown.
+    // Limits of the frame; depth beyond it is unknown.
     const int left = column * kTile_px - 1, begin = std::max(0, left),
               end = std::min(left + kTile_px + 2, depth.width_px);
     float line[kTile_px + 2] = {};

@@ -1,7 +1,7 @@
 // Which part of a depth frame may have an edge: what a plane does not explain within the sensor's noise.
 //
-// Noise is measured where it is used, by second differences of inverse depth along rows: an edge is in few of them, and
-// white noise in all. Noise that neighbours share is underrated, which costs time and no edge.
+// Noise is measured locally by second differences of inverse depth along rows: an edge affects few of them, white noise
+// affects all. Noise that neighbours share is underestimated, which costs time but no edge.
 #pragma once
 
 #include <vector>

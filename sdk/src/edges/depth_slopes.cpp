@@ -25,7 +25,7 @@ inline float squashed_slope(float here, float there, float focal_px) {
   return both_known * rise / (there + std::abs(rise) + (1 - both_known));
 }
 
-// Of `count` pixels; `here` has one more.
+// Writes `count` pixels; `here` has one more.
 MAQ_SIMD_CLONES void planes_of_row(const float* __restrict here, const float* __restrict below, size_t count,
                                    float fx_px, float fy_px, float* __restrict across, float* __restrict down,
                                    float* __restrict known) {

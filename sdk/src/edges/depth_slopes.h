@@ -1,7 +1,7 @@
-// What the edge network reads of a depth frame: slopes of inverse depth, and what is known
+// The input of the edge network: slopes of inverse depth, and a mask of known depth
 // (export/edges/depth_input.py).
 //
-// A plane's inverse depth is linear in pixels, so a crease is a step of the slope whichever way the plane leans.
+// A plane's inverse depth is linear in pixels, so a crease is a step of the slope for any tilt of the plane.
 #pragma once
 
 #include <vector>

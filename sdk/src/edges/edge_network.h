@@ -1,4 +1,4 @@
-// The edge network of a bundle (docs/formats.md), for frames of any size.
+// The edge network of a bundle (docs/reference/formats.md), for frames of any size.
 #pragma once
 
 #include <memory>
@@ -11,28 +11,28 @@ namespace maq {
 
 class EdgeNetwork {
  public:
-  // A session is made for each size when it is needed first. Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task,
-  // and MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is read, or the graph's input or output is not that of the
-  // format; what Session throws where threads are measured.
+  // Creates a session for each size when it is first needed. Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task,
+  // MAQ_ERROR_BAD_BUNDLE for an incomplete manifest or a graph with another input or output than the format, and the
+  // errors of Session while threads are measured.
   EdgeNetwork(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const SessionSettings& settings);
   EdgeNetwork(const EdgeNetwork&) = delete;
   EdgeNetwork& operator=(const EdgeNetwork&) = delete;
 
-  // In use: where the settings have MAQ_THREADS_MEASURED, what was measured when this was made.
+  // Returns the number of threads in use; with MAQ_THREADS_MEASURED, the measured number.
   int threads() const { return threads_; }
-  // Where distances are cut off, in footprints.
+  // Returns the largest distance, in footprints.
   float eps_r() const { return eps_r_; }
-  // Sides of what it is run on are multiples of it.
+  // The sides of the input must be multiples of this number.
   int multiple_px() const { return multiple_px_; }
 
-  // Room for the slopes of such a size, as DepthSlopes makes them.
+  // Returns memory for the slopes of an input of this size (DepthSlopes).
   float* input(int width_px, int height_px);
-  // These slopes -> planes as FieldDecode reads them, until the next use; the slopes are lost. Not for two threads at
-  // once. Throws MAQ_ERROR_BAD_BUNDLE where the graph is not what the manifest says,
+  // Runs the network on the slopes and overwrites them. Returns planes for FieldDecode, valid until the next use. One
+  // thread at a time. Throws MAQ_ERROR_BAD_BUNDLE if the graph does not fit its manifest,
   // MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
   const float* run(int width_px, int height_px, const RunCancel& cancel);
 
-  // In use for the latest run.
+  // Returns the provider of the latest run.
   maq_provider provider() const { return provider_; }
 
  private:

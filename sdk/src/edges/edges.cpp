@@ -22,20 +22,19 @@ SessionSettings session_settings(const OnnxRuntimeLibrary& runtime, const EdgesS
 
 void check_input(const ImageView& depth, const Intrinsics& intrinsics) {
   if (!is_depth(depth.format)) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "The frame is a picture (", pixel_format_name(depth.format),
-                ") without depth; edges are found in depth frames (DEPTH16, DEPTH32F). Of an image file that holds "
-                "depth, say the "
-                "unit: image:depth.png?depth_unit=0.001&fov=60.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, "The frame is an image (", pixel_format_name(depth.format),
+                ") without depth, but edges need depth frames (DEPTH16, DEPTH32F). For an image file with depth, add "
+                "its unit: image:depth.png?depth_unit=0.001&fov=60.");
   }
   if (intrinsics.width_px != depth.width_px || intrinsics.height_px != depth.height_px) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The intrinsics are of a camera of ", intrinsics.width_px, " x ",
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The intrinsics are for a camera of ", intrinsics.width_px, " x ",
                 intrinsics.height_px, " pixels, but the depth frame has ", depth.width_px, " x ", depth.height_px,
-                "; give those of its size.");
+                "; scale them to its size.");
   }
   const auto require_focal = [](const char* name, double value) {
     if (!(value >= 1e-3 && value <= 1e9)) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The focal length ", name, " of the intrinsics is ", value,
-                  ", but must be 0.001 to 1e9 pixels; a camera that sees 60 degrees has 0.87 times its width.");
+                  ", but must be 0.001 to 1e9 pixels; for a field of view of 60 degrees it is 0.87 times the width.");
     }
   };
   require_focal("fx_px", intrinsics.fx_px);
@@ -54,7 +53,7 @@ Edges::Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, c
       network_(runtime, std::move(bundle), session_settings(*runtime, settings)),
       cancel_(runtime),
       threads_(network_.threads()),
-      resting_(settings.average_frames) {}
+      average_(settings.average_frames) {}
 
 void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result) {
   check_input(depth, intrinsics);
@@ -67,19 +66,25 @@ void Edges::run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResul
   try {
     cancel_.check();
     find_field(depth, result);
-    cancel_.check();  // one that comes later is of the next run
+    cancel_.check();  // a later request cancels the next run
   } catch (...) {
     cancel_.reset();
     throw;
   }
 }
 
-void Edges::run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& result) {
+void Edges::run(const Frame& frame, EdgesResult& result) {
   const ImageView* const depth = depth_of(frame);
-  const ImageView& image = depth == nullptr ? frame.image : *depth;  // refused where it is no depth
-  const Intrinsics given{camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px};
-  const bool is_of_picture = given.width_px == frame.image.width_px && given.height_px == frame.image.height_px;
-  run(image, is_of_picture ? resized(given, image.width_px, image.height_px) : given, result);
+  const ImageView& image = depth == nullptr ? frame.image : *depth;  // check_input refuses an image without depth
+  const Intrinsics camera = intrinsics_of(frame.intrinsics);
+  if (depth != nullptr && camera.width_px == 0 && camera.height_px == 0) {
+    throw Error(MAQ_ERROR_UNSUPPORTED,
+                "The frame does not carry the intrinsics of its camera, which edges need for lengths. Add fov=60 "
+                "(degrees) or fx=380&fy=380 (pixels) to the URI of the source, or set desc.intrinsics for "
+                "maq_frame_wrap.");
+  }
+  const bool is_of_image = camera.width_px == frame.image.width_px && camera.height_px == frame.image.height_px;
+  run(image, is_of_image ? resized(camera, image.width_px, image.height_px) : camera, result);
 }
 
 void Edges::find_field(const ImageView& depth, EdgesResult& result) {
@@ -93,14 +98,14 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   const Stopwatch total;
   Stopwatch stage;
   const size_t pixels = size_t(field.width) * size_t(field.height);
-  for (std::vector<float>* plane : {&field.distance_r, &field.spread_r, &field.depth_m}) plane->resize(pixels);
+  for (std::vector<float>* plane : {&field.distance_r, &field.expected_error_r, &field.depth_m}) plane->resize(pixels);
   field.kind.resize(pixels);
   threads_.run(size_t(divide_up(field.height, kDepthRowsOfTask)), [&](size_t task, int) {
     const int top = int(task) * kDepthRowsOfTask, rows = std::min(kDepthRowsOfTask, field.height - top);
     depth_in_metres(window_of(depth, 0, top, field.width, rows),
                     field.depth_m.data() + size_t(top) * size_t(field.width));
   });
-  stats.averaged_pixels = resting_.add(field.depth_m.data(), field.intrinsics, threads_);
+  stats.averaged_pixels = average_.add(field.depth_m.data(), field.intrinsics, threads_);
   stats.known_pixels = std::count_if(field.depth_m.begin(), field.depth_m.end(), [](float z) { return z > 0; });
   stats.depth_ms = float(stage.lap_ms());
 
@@ -123,7 +128,7 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   stats.total_ms = float(total.elapsed_ms());
 }
 
-// Where the network must run.
+// Returns the window in which the network must run.
 FieldWindow Edges::network_window(const EdgeField& field, bool is_known) {
   if (!is_known) return {};
   const int multiple = network_.multiple_px();

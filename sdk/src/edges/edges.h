@@ -7,15 +7,14 @@
 #include "core/frame.h"
 #include "core/worker_threads.h"
 #include "edges/active_window.h"
+#include "edges/depth_average.h"
 #include "edges/edge_field.h"
 #include "edges/edge_network.h"
 #include "edges/field_decode.h"
-#include "edges/resting_depth.h"
-#include "maquette/source.h"
 
 namespace maq {
 
-// As in maq_edges_config, whose comments say what they mean.
+// The settings of maq_edges_config, which explains them.
 struct EdgesSettings {
   int threads = 1;  // or MAQ_THREADS_MEASURED
   bool spin = true;
@@ -25,16 +24,16 @@ struct EdgesSettings {
 };
 
 struct EdgesStats {
-  float depth_ms = 0;   // to metres, and the mean with frames before
-  float skip_ms = 0;    // where the network must run
-  float slopes_ms = 0;  // the network's input
+  float depth_ms = 0;   // convert depth to metres, and average it with earlier frames
+  float skip_ms = 0;    // find the window for the network
+  float slopes_ms = 0;  // compute the network's input
   float network_ms = 0;
   float decode_ms = 0;
   float total_ms = 0;
   int64_t known_pixels = 0;
-  int64_t network_pixels = 0;   // that it was run on
-  int64_t broken_pixels = 0;    // for which it gave no number
-  int64_t averaged_pixels = 0;  // whose depth is the mean of several frames
+  int64_t network_pixels = 0;   // pixels the network ran on
+  int64_t broken_pixels = 0;    // pixels with NaN from the network
+  int64_t averaged_pixels = 0;  // pixels whose depth is the mean of several frames
   maq_provider provider = MAQ_PROVIDER_CPU;
   int threads = 1;
   bool is_threads_measured = false;
@@ -47,25 +46,26 @@ struct EdgesResult {
 
 class Edges {
  public:
-  // Of a frame, with the padding that the network wants. It takes some 300 bytes a pixel.
+  // Limit for one frame with the padding for the network, which takes about 300 bytes a pixel.
   static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
-  // Throws what EdgeNetwork throws.
+  // Throws the errors of EdgeNetwork.
   Edges(std::shared_ptr<const OnnxRuntimeLibrary> runtime, Bundle bundle, const EdgesSettings& settings);
   Edges(const Edges&) = delete;
   Edges& operator=(const Edges&) = delete;
 
-  // Of a depth image and the camera that took it, which has its size. Memory of `result` is reused. Not for two threads
-  // at once. Throws MAQ_ERROR_UNSUPPORTED for an image that is not depth, MAQ_ERROR_INVALID_ARGUMENT for intrinsics of
-  // another size, or that are not finite with positive focal lengths; MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_BAD_BUNDLE,
-  // MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
+  // Computes the field of a depth image; `intrinsics` must have its size. Reuses the memory of `result`. One thread at
+  // a time. Throws MAQ_ERROR_UNSUPPORTED for an image without depth, MAQ_ERROR_INVALID_ARGUMENT for intrinsics of
+  // another size, with values that are not finite or a focal length that is not positive; MAQ_ERROR_IMAGE_SIZE,
+  // MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
   void run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result);
-  // Of a frame's own pixels, or of the depth that came with its picture: then `camera` may be that of the picture,
-  // which shows the same view. Distortion is left out of account.
-  void run(const Frame& frame, const maq_intrinsics& camera, EdgesResult& result);
-  // In use.
+  // Computes the field of a depth frame, or of the depth that came with a colour frame. Uses the frame's intrinsics,
+  // which may be those of the colour image: it shows the same view. Ignores distortion. Throws MAQ_ERROR_UNSUPPORTED
+  // for a frame without intrinsics.
+  void run(const Frame& frame, EdgesResult& result);
+  // Returns the number of threads in use.
   int threads() const { return network_.threads(); }
-  // From any thread: ends the run that runs, or else the next.
+  // Cancels the running call, or else the next. From any thread.
   void cancel() noexcept { cancel_.cancel(); }
 
  private:
@@ -76,7 +76,7 @@ class Edges {
   EdgeNetwork network_;
   RunCancel cancel_;
   WorkerThreads threads_;
-  RestingDepth resting_;
+  DepthAverage average_;
   ActiveWindow active_;
   DepthSlopes slopes_;
   FieldDecode decode_;

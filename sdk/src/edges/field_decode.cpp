@@ -13,13 +13,13 @@ namespace {
 
 constexpr int kDecodeRowsOfTask = 16;  // folded
 constexpr size_t kOutputFold = DepthSlopes::kFold, kPlanes = 4;
-// Of the logarithm of the spread / eps_r: as in training (export/edges/losses.py).
+// Limits of the logarithm of the expected error / eps_r, the same as in training (export/edges/losses.py).
 constexpr float kMinLogSpread = -7, kMaxLogSpread = 1;
 
 struct OutputRow {
   const float* depth_m;
   float* distance_r;
-  float* spread_r;
+  float* expected_error_r;
   uint8_t* kind;
 };
 
@@ -29,7 +29,7 @@ MAQ_SIMD_CLONES int decode_row(const float* __restrict distance, const float* __
                                float eps_r, const OutputRow& row) {
   const float* __restrict depth_m = row.depth_m;
   float* __restrict distance_r = row.distance_r;
-  float* __restrict spread_r = row.spread_r;
+  float* __restrict expected_error_r = row.expected_error_r;
   uint8_t* __restrict kind = row.kind;
   const float largest_spread = eps_r * std::exp(kMaxLogSpread);
   int broken = 0;
@@ -40,14 +40,15 @@ MAQ_SIMD_CLONES int decode_row(const float* __restrict distance, const float* __
     const float limited = near > 0 ? near : 0.0f;
     distance_r[x] = depth_m[x] > 0 ? limited : eps_r;
     const float low = log_spread[x] < kMaxLogSpread ? log_spread[x] : kMaxLogSpread;
-    spread_r[x] = low > kMinLogSpread ? low : kMinLogSpread;
+    expected_error_r[x] = low > kMinLogSpread ? low : kMinLogSpread;
   }
   // Apart, or compilers make branches of the limits.
-  for (size_t x = 0; x < count; ++x) spread_r[x] = exp_of_negative(spread_r[x] - kMaxLogSpread) * largest_spread;
+  for (size_t x = 0; x < count; ++x)
+    expected_error_r[x] = exp_of_negative(expected_error_r[x] - kMaxLogSpread) * largest_spread;
   for (size_t x = 0; x < count; ++x) {
     const int which = crease[x] >= boundary[x] ? int(kCreaseEdge) : int(kBoundaryEdge);
     kind[x] = uint8_t(distance_r[x] < eps_r ? which : int(kNoEdge));
-    spread_r[x] = depth_m[x] > 0 ? spread_r[x] : eps_r;
+    expected_error_r[x] = depth_m[x] > 0 ? expected_error_r[x] : eps_r;
   }
   return broken;
 }
@@ -78,7 +79,7 @@ int64_t FieldDecode::write(const float* planes, const FieldWindow& window, Worke
         const auto plane = [&](size_t c) { return scratch + (kOutputFold * c + y) * width; };
         broken_[size_t(worker)] += decode_row(plane(0), plane(1), plane(2), plane(3), inside, field.eps_r,
                                               {field.depth_m.data() + begin, field.distance_r.data() + begin,
-                                               field.spread_r.data() + begin, field.kind.data() + begin});
+                                               field.expected_error_r.data() + begin, field.kind.data() + begin});
       }
     }
   });
@@ -89,8 +90,8 @@ void clear_outside(const FieldWindow& window, EdgeField& field) {
   const auto clear = [&](size_t begin, size_t end) {
     std::fill(field.distance_r.begin() + std::ptrdiff_t(begin), field.distance_r.begin() + std::ptrdiff_t(end),
               field.eps_r);
-    std::fill(field.spread_r.begin() + std::ptrdiff_t(begin), field.spread_r.begin() + std::ptrdiff_t(end),
-              field.eps_r);
+    std::fill(field.expected_error_r.begin() + std::ptrdiff_t(begin),
+              field.expected_error_r.begin() + std::ptrdiff_t(end), field.eps_r);
     std::fill(field.kind.begin() + std::ptrdiff_t(begin), field.kind.begin() + std::ptrdiff_t(end), kNoEdge);
   };
   const int left = std::clamp(window.left_px, 0, field.width);

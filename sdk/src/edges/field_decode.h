@@ -1,4 +1,4 @@
-// From the edge network's output to the field.
+// Converts the edge network's output to the field.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ class FieldDecode {
 
   // Writes the planes of `field` inside `window`, whose sides are even; the size, eps_r and depth of the field are set.
   // `planes`: [height / 2][width / 2][kChannels], folded as the input is: distance / eps_r, logarithm of its spread
-  // / eps_r, logits of crease and boundary. A distance that is NaN counts as eps_r. Returns how many there were.
+  // / eps_r, logits of crease and boundary. NaN becomes eps_r. Returns the number of NaN distances.
   int64_t write(const float* planes, const FieldWindow& window, WorkerThreads& threads, EdgeField& field);
 
  private:
@@ -23,7 +23,7 @@ class FieldDecode {
   std::vector<int64_t> broken_;
 };
 
-// Writes what is true far from edges, or where nothing is known, into all of the field but `window`.
+// Fills the field outside `window` with the values far from edges or without depth.
 void clear_outside(const FieldWindow& window, EdgeField& field);
 
 }  // namespace maq

@@ -1,7 +1,6 @@
 #include "edges/field_files.h"
 
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -17,7 +16,7 @@ constexpr double kUnit_r = 0.001;  // of a stored 1
 constexpr size_t kMaxFieldJsonBytes = 4 << 10;
 
 std::string json_of(const EdgeField& field) {
-  // Where a few bytes fail, the JSON library ends the process.
+  // The JSON library ends the process when an allocation fails.
   require_memory(kMaxFieldJsonBytes);
   const Intrinsics& camera = field.intrinsics;
   nlohmann::ordered_json document;
@@ -43,10 +42,8 @@ std::vector<uint8_t> distance_png(const EdgeField& field) {
 
 }  // namespace
 
-void write_field_files(const EdgeField& field, const std::string& folder, const std::string& stem) {
-  const auto path_of = [&](const char* suffix) { return (std::filesystem::path(folder) / (stem + suffix)).string(); };
-  AtomicFile distance_file(path_of("_distance.png")), kind_file(path_of("_kind.png")),
-      json_file(path_of("_edges.json"));
+void write_field_files(const EdgeField& field, const std::string& path) {
+  AtomicFile distance_file(path + "_distance.png"), kind_file(path + "_kind.png"), json_file(path + "_edges.json");
   const std::vector<uint8_t> distance = distance_png(field);
   const ImageView kinds = packed_view(MAQ_PIXEL_GREY8, field.width, field.height, field.kind.data());
   const std::vector<uint8_t> kind = encode_image(kinds, ".png");

@@ -1,4 +1,4 @@
-// The files of a field (docs/formats.md).
+// The files of a field (docs/reference/formats.md).
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace maq {
 
-// Writes <stem>_distance.png (16 bits, thousandths of r), <stem>_kind.png and <stem>_edges.json into an existing
-// folder. Each appears atomically, and none before all are written. Throws MAQ_ERROR_UNWRITABLE, and what file_codecs()
-// and encode_image() throw.
-void write_field_files(const EdgeField& field, const std::string& folder, const std::string& stem);
+// Writes <path>_distance.png (16 bits, thousandths of r), <path>_kind.png and <path>_edges.json. Each appears
+// atomically, and none before all are written. Throws MAQ_ERROR_UNWRITABLE and the errors of file_codecs() and
+// encode_image().
+void write_field_files(const EdgeField& field, const std::string& path);
 
 }  // namespace maq

@@ -21,7 +21,7 @@ constexpr int kBlueOfU = 2116026;   // 2.018
 
 constexpr int kBlockPx = 128;  // even; the work of a block stays in the first cache
 
-// What the chroma of a block adds to each of its pixels, with the half that rounds.
+// The contribution of a block's chroma to each of its pixels, with the half for rounding.
 struct ChromaTerms {
   int blue[kBlockPx], green[kBlockPx], red[kBlockPx];
 };
@@ -187,7 +187,7 @@ ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory) {
   const ConvertRow convert = row_to_bgr(image.format);
   if (convert == nullptr && image.format != MAQ_PIXEL_NV12) {
     if (is_depth(image.format)) {
-      throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; give the picture.");
+      throw Error(MAQ_ERROR_UNSUPPORTED, "A depth image has no colours; use the colour image.");
     }
     throw Error(MAQ_ERROR_UNSUPPORTED, "Pixel format ", int(image.format), " is not known.");
   }

@@ -12,7 +12,7 @@ struct Point {
   double x = 0, y = 0;
 };
 
-// From one picture to another, in continuous coordinates: pixel (x, y) covers [x, x + 1) x [y, y + 1).
+// Maps one image to another, in continuous coordinates: pixel (x, y) covers [x, x + 1) x [y, y + 1).
 struct AffineMap {
   double xx = 1, xy = 0, shift_x = 0;  // x' = xx x + xy y + shift_x
   double yx = 0, yy = 1, shift_y = 0;  // y' = yx x + yy y + shift_y
@@ -22,7 +22,7 @@ struct AffineMap {
   }
   // This map first, then `second`.
   AffineMap then(const AffineMap& second) const;
-  // Of a map whose determinant is not 0.
+  // Inverts a map whose determinant is not 0.
   AffineMap inverse() const;
 };
 

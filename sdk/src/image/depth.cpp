@@ -17,7 +17,7 @@ void row_of_16_bits(const uint8_t* from, size_t width, float unit_m, float* __re
 }
 
 void row_of_floats(const uint8_t* from, size_t width, float unit_m, float* __restrict metres) {
-  // As integers, the positive normal numbers are an interval.
+  // The positive normal numbers, read as integers, are an interval.
   constexpr uint32_t kSmallestNormal = 0x00800000, kInfinity = 0x7f800000;
   for (size_t x = 0; x < width; ++x) {
     float depth = 0;

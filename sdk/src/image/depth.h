@@ -9,7 +9,7 @@ namespace maq {
 // unknown: 0 and 65535 of 16 bits; NaN, infinite, 0, negative and denormal floats. `unit_m`: metres of a stored 1.
 void depth_in_metres(const ImageView& depth, double unit_m, float* metres);
 
-// Of a frame, whose unit its format says.
+// Converts with the unit of the format.
 inline void depth_in_metres(const ImageView& depth, float* metres) {
   depth_in_metres(depth, depth.format == MAQ_PIXEL_DEPTH16 ? 0.001 : 1, metres);
 }

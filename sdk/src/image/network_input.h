@@ -17,7 +17,7 @@ struct NetworkSize {
 
 struct NetworkInputSpec {
   int multiple_of = 1;          // the padded sides are multiples of it
-  std::array<float, 3> mean{};  // of R, G, B, in 0..255
+  std::array<float, 3> mean{};  // R, G, B, in 0..255
   std::array<float, 3> std{};
 };
 
@@ -37,7 +37,7 @@ struct ResizeAxis {
 
 struct NetworkInput {
   std::vector<float> values;  // [3, padded_height_px, padded_width_px]: R, G, B, normalised; zero in the padding
-  int width_px = 0;           // of the resized image
+  int width_px = 0;           // size of the resized image
   int height_px = 0;
   int padded_width_px = 0;  // rounded up to the spec's multiple
   int padded_height_px = 0;
@@ -49,8 +49,8 @@ struct NetworkInput {
   std::vector<uint8_t> converted;  // the image as BGR, where it comes in another format
 };
 
-// Of an image of `width_px` x `height_px`: its long side becomes `long_side_px`, the other is scaled alike (halves are
-// rounded to even, as in Python), no side is less than 1.
+// Returns the size for an image of `width_px` x `height_px`: the long side becomes `long_side_px`, the other side keeps
+// the ratio (halves are rounded to even, like in Python) and is at least 1.
 NetworkSize network_size(int width_px, int height_px, int long_side_px);
 
 // Resizes to `size` (area when shrinking, bilinear when growing), normalises and pads, in one pass and without rounding

@@ -72,7 +72,7 @@ void upright_to_nv12(const YuvImage& image, uint8_t* nv12) {
   }
 }
 
-// A plane as its rotated picture is read.
+// Reads a plane in the order of the rotated image.
 struct RotatedPlane {
   const uint8_t* first;
   ptrdiff_t across, down;

@@ -12,7 +12,7 @@
 namespace maq {
 
 struct Bundle {
-  std::string prefix;  // of file names in errors: "<folder>/", or "memory:"
+  std::string prefix;  // prefix of file names in errors: "<folder>/", or "memory:"
   Manifest manifest;
   // The very bytes that were verified, by file name; networks are made from them and not from the disk again.
   std::map<std::string, std::vector<uint8_t>> files;
@@ -33,7 +33,7 @@ struct NamedBuffer {
 // weights in another file. Files that the manifest does not list are not read.
 Bundle read_bundle(const std::string& folder);
 
-// The same of buffers in any order, which are copied. Throws MAQ_ERROR_INVALID_ARGUMENT for a buffer without a name or
+// Reads buffers in any order and copies them. Throws MAQ_ERROR_INVALID_ARGUMENT for a buffer without a name or
 // data, and for two of one name; MAQ_ERROR_NOT_FOUND where none is "manifest.json"; else what the folder's throws.
 Bundle read_bundle(const std::vector<NamedBuffer>& buffers);
 

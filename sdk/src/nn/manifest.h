@@ -1,5 +1,5 @@
-// The manifest of a model bundle (docs/formats.md): what all bundles have in common. What belongs to one task is read
-// by the system that runs it, from `root`.
+// The manifest of a model bundle (docs/reference/formats.md): the keys common to all bundles. The system of a task
+// reads its own keys from `root`.
 #pragma once
 
 #include <cstdint>

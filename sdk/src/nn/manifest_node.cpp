@@ -61,7 +61,7 @@ std::vector<std::pair<std::string, ManifestNode>> ManifestNode::members() const 
 }
 
 std::string ManifestNode::text() const {
-  constexpr size_t kMaxBytes = 1000;  // of names, which errors quote
+  constexpr size_t kMaxBytes = 1000;  // limit for names, which errors quote
   if (!value_->is_string()) fail("is not a text");
   const auto text = value_->get<std::string>();
   if (text.size() > kMaxBytes) fail("has ", text.size(), " bytes, but must have at most ", kMaxBytes);

@@ -14,7 +14,7 @@ namespace {
 
 // The oldest interface that has what the SDK calls and that it was tested with; later releases keep it.
 constexpr uint32_t kApiVersion = 20;
-// What is called where it is there (provider.cpp).
+// Functions that are called if the library has them (provider.cpp).
 constexpr uint32_t kNewerApiVersion = 24;
 static_assert(kNewerApiVersion <= ORT_API_VERSION, "the headers are of an older ONNX Runtime");
 constexpr char kFileName[] = "libonnxruntime.so.1";
@@ -48,7 +48,7 @@ void* find_library(const std::string& explicit_path, std::string* opened_path) {
               folder, " or on the system's search path.", kRemedy);
 }
 
-// What the schemas of operators take; where that cannot be had, ONNX prints.
+// The memory for the schemas of operators; without it, ONNX prints.
 constexpr size_t kEnvironmentBytes = size_t(24) << 20;
 
 // ONNX Runtime has one environment for a process, whose logger is the one of the first caller and may be gone by the

@@ -15,9 +15,9 @@ maq_provider available_provider(const OnnxRuntimeLibrary& runtime, maq_provider 
 // MAQ_ERROR_UNSUPPORTED where this build does not offer it.
 void append_provider(const OnnxRuntimeLibrary& runtime, maq_provider provider, int threads, OrtSessionOptions* options);
 
-// What `provider` took of the graph of a session that was made with it, to the log. Throws MAQ_ERROR_UNSUPPORTED where
-// that is less than half of the nodes: the CPU, which has few threads in such a session, would run the others. Older
-// releases of ONNX Runtime than 1.24 do not tell; their choice stays.
+// Logs the share of a session's graph that `provider` runs. Throws MAQ_ERROR_UNSUPPORTED for less than half of the
+// nodes: the CPU, which has few threads in such a session, would run the others. ONNX Runtime before 1.24 does not
+// report the share; its choice stays.
 void check_assignment(const OnnxRuntimeLibrary& runtime, maq_provider provider, const OrtSession* session,
                       const std::string& name);
 

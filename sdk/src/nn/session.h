@@ -68,7 +68,7 @@ class RunCancel {
 
   // Any thread.
   void cancel() noexcept;
-  // Of the thread that runs. Throws MAQ_CANCELLED after cancel(), until reset().
+  // Called by the running thread. Throws MAQ_CANCELLED after cancel(), until reset().
   void check() const;
   void reset() noexcept;
 
@@ -77,7 +77,7 @@ class RunCancel {
 
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   OrtRunOptions* options_ = nullptr;
-  std::mutex mutex_;  // of changes, so that both of these say the same
+  std::mutex mutex_;  // guards changes, so that both of these agree
   std::atomic<bool> is_cancelled_{false};
 };
 
@@ -133,7 +133,7 @@ class Session {
   std::vector<Binding> inputs_, outputs_;
   std::vector<const OrtValue*> input_values_;
   std::vector<OrtValue*> output_values_;
-  std::vector<std::vector<float>> buffers_;  // of the outputs
+  std::vector<std::vector<float>> buffers_;  // memory of the outputs
   std::vector<TensorView> views_;
 };
 

@@ -23,11 +23,11 @@ class SessionThreads {
   SessionThreads& operator=(const SessionThreads&) = delete;
 
   int count() const { return int(waiting_.size()); }
-  // Why there are fewer than asked for; empty if there are not.
+  // Returns why there are fewer threads than requested; empty if there are enough.
   const std::string& shortage() const { return shortage_; }
 
   // For OrtApi's SessionOptionsSetCustomCreateThreadFn, whose options are this object, and …SetCustomJoinThreadFn.
-  // What was assigned does not need this object any more. Null when all were.
+  // An assigned thread does not need this object any more. Null when all are assigned.
   static OrtCustomThreadHandle assign(void* self, OrtThreadWorkerFn work, void* argument) noexcept;
   static void join(OrtCustomThreadHandle handle) noexcept;
 

@@ -7,7 +7,7 @@
 namespace maq {
 namespace {
 
-// What "height", "width" or one of them "/2", "/4", … is for that picture; nothing for other names.
+// Returns the value of "height", "width", or one of them "/2", "/4", … for the image; nothing for other names.
 std::optional<int64_t> size_of(const std::string& name, int width_px, int height_px) {
   const size_t slash = name.find('/');
   const std::string side = name.substr(0, slash);

@@ -1,4 +1,4 @@
-// Sessions of one network for pictures of several sizes. A graph that leaves height and width open runs faster where a
+// Sessions of one network for images of several sizes. A graph that leaves height and width open runs faster where a
 // session is told them, so each size has a session of its own, and the last few are kept.
 #pragma once
 
@@ -18,8 +18,8 @@ class SizedSessions {
   SizedSessions(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
                 std::string name, SessionSettings settings, size_t max_kept);
 
-  // The session for a picture of that size: the sizes that the graph's inputs call "height", "width", "height/2" and so
-  // on are fixed. Stays until `max_kept` others were asked for. Throws what Session throws.
+  // The session for an image of that size: the sizes that the graph's inputs call "height", "width", "height/2" and so
+  // on are fixed. Stays until `max_kept` others were asked for. Throws the errors of Session.
   Session& at(int width_px, int height_px);
 
  private:

@@ -15,7 +15,7 @@ namespace maq {
 // the time on i + 1 threads, infinite or NaN where they failed. 1 where all did, or there is none.
 int choose_threads(const std::vector<double>& median_ms);
 
-// Runs once what is measured.
+// Runs the measured work once.
 using TimedRun = std::function<void()>;
 
 // Measures 1 to `max_threads` threads and chooses. `open` makes what is to run on so many, which is gone afterwards.
@@ -35,7 +35,7 @@ struct TimedNetwork {
 };
 
 // measure_threads() of up to default_threads() for the network on zeros: layers take the same time whatever the values.
-// `settings.threads` is not read. Throws what Session throws.
+// `settings.threads` is not read. Throws the errors of Session.
 int measure_threads(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const TimedNetwork& network,
                     SessionSettings settings);
 

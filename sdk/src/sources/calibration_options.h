@@ -16,16 +16,16 @@ constexpr char kCalibrationOptions[] = "fov, fx, fy, cx, cy";
 // MAQ_ERROR_INVALID_ARGUMENT for what is none.
 std::optional<double> take_depth_unit(SourceUri& uri);
 
-// What the options say; the size of the pictures is known when the source is open.
+// The calibration options. The size of the images is known when the source is open.
 class CalibrationOptions {
  public:
-  // Takes those options off the list. Throws MAQ_ERROR_INVALID_ARGUMENT for what is no focal length, field of view or
-  // place, for both of fov and fx, and for a part without either.
+  // Takes the options off the list. Throws MAQ_ERROR_INVALID_ARGUMENT for an invalid focal length, field of view or
+  // position, for fov together with fx, and for other options without fov or fx.
   explicit CalibrationOptions(SourceUri& uri);
   CalibrationOptions() = default;
 
-  // Without distortion, of pictures of that size; nothing when none was given. The principal point is the middle where
-  // it was not given.
+  // Returns intrinsics without distortion for images of this size; nothing without options. The default principal point
+  // is the middle.
   std::optional<maq_intrinsics> intrinsics(int width_px, int height_px) const;
 
  private:

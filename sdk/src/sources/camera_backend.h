@@ -1,4 +1,4 @@
-// What a camera backend is: a device that streams into buffers of its own. LiveSource makes a source of it.
+// The interface of a camera backend: a device that streams into buffers of its own. LiveSource makes a source of it.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@ constexpr int kDefaultCameraWidthPx = 640, kDefaultCameraHeightPx = 480;
 
 constexpr double kMillimetre = 0.001;  // the unit of DEPTH16
 
-// What the app asks for; 0 or empty: the device's default. The nearest that the device offers is taken.
+// The requested mode; 0 or empty: the device's default. The device's nearest mode is used.
 struct CameraRequest {
   std::string format;  // four letters, as the device calls it: "MJPG"
   int width_px = 0;
   int height_px = 0;
   double fps = 0;
-  double depth_unit_m = kMillimetre;  // of a device whose pixels are depth: metres of a stored 1, which it does not say
+  double depth_unit_m = kMillimetre;  // for depth: metres of a stored 1, unknown to the device
 };
 
 struct CameraFormat {
@@ -37,14 +37,14 @@ struct CameraFormat {
 
 // A filled buffer of the device, held until give_back().
 struct CameraBuffer {
-  ImageView image;                    // of pixels as they come; of a JPEG image the size agreed on, or none
-  double depth_unit_m = kMillimetre;  // of `image` as DEPTH16; frames get metres as floats where it is another
-  const uint8_t* jpeg = nullptr;      // of a JPEG image
+  ImageView image;                    // the pixels; for JPEG only the agreed size, or none
+  double depth_unit_m = kMillimetre;  // unit of DEPTH16; with another unit, frames get metres as floats
+  const uint8_t* jpeg = nullptr;      // the JPEG image
   size_t jpeg_bytes = 0;
-  ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the picture; no width when there is none
-  FrameOrigin origin;                            // of a recording that is replayed
+  ImageView depth{MAQ_PIXEL_DEPTH16, 0, 0, {}};  // aligned with the image; width 0: none
+  FrameOrigin origin;                            // origin in a replayed recording
   int slot = 0;
-  int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the picture was taken; no later than the one before: it is dropped
+  int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the image was taken; no later than the one before: it is dropped
   uint32_t sequence = 0;     // counts the device's frames, those that were lost included
   bool damaged = false;      // the device says that pixels are missing
   uint32_t seeks = 0;        // how often Camera::seek took effect before this frame
@@ -52,7 +52,7 @@ struct CameraBuffer {
 
 // A control and what it was set to.
 struct ControlSetting {
-  maq_control which;
+  maq_source_control which;
   double value;
 };
 
@@ -61,14 +61,14 @@ class Camera : public FrameOwner {
   enum class Event { kFrame, kTimeout, kWoken, kLost, kEnd };
 
   virtual const CameraFormat& format() const = 0;
-  // The same for the same device in the same socket, whatever number it gets.
+  // Identifies the device in its socket, for any device number.
   virtual const std::string& identity() const = 0;
   // Null when the device does not know.
   virtual const maq_intrinsics* intrinsics() const { return nullptr; }
   // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for
   // values out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
-  virtual maq_control_info control(maq_control which);
-  virtual void set_control(maq_control which, double value);
+  virtual maq_source_control_info control(maq_source_control which);
+  virtual void set_control(maq_source_control which, double value);
   // From any thread, of a replay: the next frame is the first at that time or later.
   virtual void seek(int64_t time_ns);
   // Waits until a buffer is filled, `timeout_ms` have passed, `wake_fd` is readable, the device is lost (`reason` says

@@ -1,4 +1,4 @@
-// What a failed system call on a camera means to an app: a status, and what to do about it. One table for all backends.
+// Maps a failed system call on a camera to a status and a remedy. One table for all backends.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace maq {
 
-// Of an error number; MAQ_ERROR_UNSUPPORTED for those without a meaning of their own.
+// Returns the status of an error number; MAQ_ERROR_UNSUPPORTED for all others.
 maq_status camera_status(int error);
 
 // A sentence with a leading space; "" where nothing is known to help.

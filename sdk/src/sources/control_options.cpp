@@ -10,15 +10,15 @@ namespace {
 
 struct Option {
   const char* key;
-  maq_control manual;
-  std::optional<maq_control> automatic;
+  maq_source_control manual;
+  std::optional<maq_source_control> automatic;
 };
 // The automatic exposure of most devices chooses the gain as well.
-const Option kOptions[] = {{"exposure", MAQ_CONTROL_EXPOSURE, MAQ_CONTROL_AUTO_EXPOSURE},
-                           {"gain", MAQ_CONTROL_GAIN, MAQ_CONTROL_AUTO_EXPOSURE},
-                           {"focus", MAQ_CONTROL_FOCUS, MAQ_CONTROL_AUTO_FOCUS},
-                           {"white_balance", MAQ_CONTROL_WHITE_BALANCE, MAQ_CONTROL_AUTO_WHITE_BALANCE},
-                           {"brightness", MAQ_CONTROL_BRIGHTNESS, {}}};
+const Option kOptions[] = {{"exposure", MAQ_SOURCE_CONTROL_EXPOSURE, MAQ_SOURCE_CONTROL_AUTO_EXPOSURE},
+                           {"gain", MAQ_SOURCE_CONTROL_GAIN, MAQ_SOURCE_CONTROL_AUTO_EXPOSURE},
+                           {"focus", MAQ_SOURCE_CONTROL_FOCUS, MAQ_SOURCE_CONTROL_AUTO_FOCUS},
+                           {"white_balance", MAQ_SOURCE_CONTROL_WHITE_BALANCE, MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE},
+                           {"brightness", MAQ_SOURCE_CONTROL_BRIGHTNESS, {}}};
 
 }  // namespace
 
@@ -36,10 +36,10 @@ std::vector<ControlSetting> take_control_options(SourceUri& uri) {
                   option.automatic ? " or auto." : ".");
     }
   }
-  const auto sets = [&](maq_control which) {
+  const auto sets = [&](maq_source_control which) {
     return std::any_of(settings.begin(), settings.end(), [&](const auto& setting) { return setting.which == which; });
   };
-  if (sets(MAQ_CONTROL_EXPOSURE) && sets(MAQ_CONTROL_AUTO_EXPOSURE)) {
+  if (sets(MAQ_SOURCE_CONTROL_EXPOSURE) && sets(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "gain=auto in ", uri.text,
                 " leaves the exposure to the device as well; give the gain as a number, or exposure=auto.");
   }

@@ -24,7 +24,7 @@ using Clock = MonotonicClock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReconnectPause(100);
-constexpr milliseconds kStopTimeout(40);     // of the 50 ms that closing may take
+constexpr milliseconds kStopTimeout(40);     // part of the 50 ms that closing may take
 constexpr uint32_t kMaxLostAtOnce = 100000;  // minutes of frames
 constexpr int kMaxWaitMs = 200;              // a stall is noticed between two waits
 
@@ -64,9 +64,9 @@ struct LiveSource::State {
   bool reporting = false;  // the thread is in the caller's on_state
   bool ended = false;      // the thread
   std::thread thread;
-  JpegDecoder jpeg;  // of next() alone
+  JpegDecoder jpeg;  // used by read() alone
   bool warned_of_bad_jpeg = false;
-  std::optional<EventFd> news;  // of the app, once it has asked for it
+  std::optional<EventFd> news;  // for the app, once it has asked for it
   bool is_signalled = false;    // the news
 
   std::mutex control_mutex;                  // one call at a time; before `mutex`, and never taken by the thread
@@ -259,7 +259,7 @@ struct LiveSource::State {
   void stream(std::shared_ptr<Camera>& camera) {
     uint64_t next_sequence = 0;  // continues when the camera is opened again
     uint32_t last_number = 0;    // the device's own
-    bool is_first = true;        // of the camera as it was opened last
+    bool is_first = true;        // first frame since the camera was opened
     int64_t last_time_ns = INT64_MIN;
     auto last_frame = Clock::now();
     bool stalled = false;
@@ -406,12 +406,12 @@ uint64_t LiveSource::drops() const {
   return state_->dropped;
 }
 
-maq_control_info LiveSource::control(maq_control which) {
+maq_source_control_info LiveSource::control(maq_source_control which) {
   std::lock_guard<std::mutex> lock(state_->control_mutex);
   return state_->present_camera()->control(which);
 }
 
-void LiveSource::set_control(maq_control which, double value) {
+void LiveSource::set_control(maq_source_control which, double value) {
   std::lock_guard<std::mutex> lock(state_->control_mutex);
   const std::shared_ptr<Camera> camera = state_->present_camera();
   camera->set_control(which, value);
@@ -441,7 +441,7 @@ int LiveSource::event_fd() {
   return state_->news->get();
 }
 
-NextFrame LiveSource::next(int64_t timeout_ns, Frame& frame) {
+NextFrame LiveSource::read(int64_t timeout_ns, Frame& frame) {
   const bool has_end = timeout_ns >= 0;
   const auto deadline = deadline_after(timeout_ns);
   for (;;) {

@@ -24,14 +24,12 @@ class LiveSource : public Source {
   const SourceInfo& info() const override { return info_; }
   uint64_t drops() const override;
   const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
-  // Of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. What was set is restored when it is
-  // back.
-  maq_control_info control(maq_control which) override;
-  void set_control(maq_control which, double value) override;
-  // Of a replayed source: frames from before are dropped.
+  // Controls of the camera, from any thread. Throw MAQ_ERROR_DEVICE_LOST while it is lost. Controls that were set are
+  // restored when it is back.
+  maq_source_control_info control(maq_source_control which) override;
+  void set_control(maq_source_control which, double value) override;
+  // Moves a replayed source. Waiting frames are dropped.
   void seek(int64_t time_ns) override;
-  // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
-  NextFrame next(int64_t timeout_ns, Frame& frame) override;
   // The thread closes the camera as soon as that answers.
   void stop() override;
   void wait_for_report() override;
@@ -39,6 +37,9 @@ class LiveSource : public Source {
 
  private:
   struct State;
+
+  // Throws MAQ_ERROR_DEVICE_LOST when the camera was lost and did not come back in time.
+  NextFrame read(int64_t timeout_ns, Frame& frame) override;
 
   std::shared_ptr<State> state_;
   SourceInfo info_;

@@ -86,7 +86,7 @@ const Entry* find_entry(const std::string& scheme) {
   return found == std::end(kEntries) ? nullptr : found;
 }
 
-// Opens a source that is not a camera. Pictures larger than the settings allow are scaled down; `uri` keeps the size.
+// Opens a source that is not a camera. Images larger than the settings allow are scaled down; `uri` keeps the size.
 std::unique_ptr<Source> open_within(const Entry& entry, SourceUri& uri, const SourceSettings& settings) {
   std::unique_ptr<Source> source = entry.open(uri, settings.log);
   const SourceInfo& info = source->info();
@@ -120,12 +120,12 @@ bool takes_live(SourceUri& uri, const SourceSettings& settings, bool has_faults)
   return is_live;
 }
 
-// Of a scheme that does not stand for another.
+// Opens a scheme that does not stand for another.
 std::unique_ptr<Source> open_entry(const Entry& entry, SourceUri uri, const SourceSettings& settings) {
   const FaultPlan faults = take_faults(uri);
   const bool is_path = entry.camera != nullptr && uri.target.rfind('/', 0) == 0;
   const std::string name = is_path ? uri.target : uri.scheme + ":" + uri.target;
-  // Those that the app holds, those that wait for it, one that is handed over and one that the device fills.
+  // Buffers that the app holds, buffers that wait for it, one that is handed over, and one that the device fills.
   const int buffers = settings.pool_size + settings.queue_length + 2;
   std::vector<ControlSetting> controls;
   CalibrationOptions calibration;

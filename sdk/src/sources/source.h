@@ -1,4 +1,4 @@
-// What every source is.
+// The interface of all sources.
 #pragma once
 
 #include <cstdint>
@@ -24,29 +24,38 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual const SourceInfo& info() const = 0;
-  // Frames lost so far, on their way or because the app did not take them.
+  // Returns the number of frames lost so far: in transit, or because the app did not take them.
   virtual uint64_t drops() const { return 0; }
-  // Null when the source does not know.
+  // Returns null if they are unknown.
   virtual const maq_intrinsics* intrinsics() const { return nullptr; }
-  // As those of a camera; every other source throws MAQ_ERROR_UNSUPPORTED.
-  virtual maq_control_info control(maq_control which);
-  virtual void set_control(maq_control which, double value);
-  // Throws MAQ_ERROR_UNSUPPORTED where it cannot be done.
+  // Controls of a camera; other sources throw MAQ_ERROR_UNSUPPORTED.
+  virtual maq_source_control_info control(maq_source_control which);
+  virtual void set_control(maq_source_control which, double value);
+  // Throws MAQ_ERROR_UNSUPPORTED unless can_seek().
   virtual bool can_seek() const { return false; }
   virtual void seek(int64_t time_ns);
-  // Fills `frame` (pixels, time, sequence) with the next frame, unless it says something else. Pixels may be those that
-  // the frame had before; the rest is clear (Frame::clear).
-  virtual NextFrame next(int64_t timeout_ns, Frame& frame) = 0;
-  // From any thread, for good: where next() waits, it returns kStopped, now and later. Others end what they decode.
+  // Fills `frame` with the next frame if it returns kFrame. The frame carries the intrinsics of the source. The caller
+  // has cleared it (Frame::clear).
+  NextFrame next(int64_t timeout_ns, Frame& frame) {
+    const NextFrame status = read(timeout_ns, frame);
+    const maq_intrinsics* const known = status == NextFrame::kFrame ? intrinsics() : nullptr;
+    frame.intrinsics = known == nullptr ? maq_intrinsics{} : *known;
+    return status;
+  }
+  // From any thread, for good: a waiting next() returns kStopped, now and later. Other sources finish decoding.
   virtual void stop() {}
-  // After stop(): returns when no state callback runs any more; in a state callback, at once.
+  // After stop(): waits until no state callback runs; inside a state callback it returns at once.
   virtual void wait_for_report() {}
-  // From any thread: a descriptor of the source that is readable while next() would not wait. Throws
-  // MAQ_ERROR_UNSUPPORTED where it never does.
+  // From any thread: returns a descriptor that is readable while next() would not wait. Throws MAQ_ERROR_UNSUPPORTED if
+  // next() never waits.
   virtual int event_fd();
+
+ private:
+  // Fills pixels, time and sequence of the frame for next(). Its memory may hold the pixels of an earlier frame.
+  virtual NextFrame read(int64_t timeout_ns, Frame& frame) = 0;
 };
 
-// Of maq_source_config, whose comments say what they mean.
+// The settings of maq_source_config, which explains them.
 struct SourceSettings {
   int pool_size = 4;
   int queue_length = 1;

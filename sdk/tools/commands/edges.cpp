@@ -35,21 +35,19 @@ struct EdgesOptions {
   FrameLimits limits;
 };
 
-maq_intrinsics intrinsics_of(const SourceArgument& argument, const maquette::Source& source) {
-  const auto found = source.intrinsics();
-  if (!found) {
-    const char* const more = argument.uri.find('?') == std::string::npos ? "?" : "&";
-    throw std::runtime_error(argument.uri +
-                             " does not say how the camera maps directions to pixels, from which lengths come; add the "
-                             "horizontal field of view in degrees, or focal lengths in pixels: " +
-                             argument.uri + more + "fov=60, " + argument.uri + more + "fx=380&fy=380.");
-  }
-  return *found;
+// The library's own error cannot repeat the URI.
+void require_intrinsics(const SourceArgument& argument, const maquette::Source& source) {
+  if (source.intrinsics()) return;
+  const char* const more = argument.uri.find('?') == std::string::npos ? "?" : "&";
+  throw std::runtime_error(argument.uri +
+                           " has no calibration, which is needed for lengths. Add the horizontal field of view in "
+                           "degrees, or the focal lengths in pixels: " +
+                           argument.uri + more + "fov=60, " + argument.uri + more + "fx=380&fy=380.");
 }
 
 double percent(int64_t part, int64_t whole) { return 100.0 * double(part) / double(whole); }
 
-// Of a frame, as far as they were asked for.
+// The curves of a frame, if an option needs them.
 struct FoundCurves {
   std::optional<maquette::EdgesCurves> all;
   std::vector<maq_edges_curve> curves;
@@ -61,7 +59,7 @@ FoundCurves find_curves(const EdgesOptions& options, const maquette::EdgesResult
   FoundCurves found;
   if (options.formats.empty() && !options.boxes && !options.overlay) return found;
   maq_edges_curves_config config = maquette::default_edges_curves_config();
-  config.find_boxes = options.boxes ? 1 : 0;
+  config.skip_boxes = options.boxes ? 0 : 1;
   found.all = result.find_curves(config);
   found.curves = found.all->curves();
   found.corners = found.all->corners();
@@ -70,7 +68,7 @@ FoundCurves find_curves(const EdgesOptions& options, const maquette::EdgesResult
 }
 
 nlohmann::ordered_json describe(const maq_edges_box& box) {
-  return {{"size_m", box.size_m}, {"plus_minus_m", box.plus_minus_m}, {"corners", box.corner_count}};
+  return {{"size_m", box.size_m}, {"size_tolerance_m", box.size_tolerance_m}, {"corners", box.corner_count}};
 }
 
 std::string text_of(const maq_edges_box& box) {
@@ -78,7 +76,7 @@ std::string text_of(const maq_edges_box& box) {
   for (size_t i = 0; i < 3; ++i) {
     char side[64];
     std::snprintf(side, sizeof side, "%s%.0f +- %.0f", i == 0 ? "" : " x ", 1e3 * box.size_m[i],
-                  1e3 * box.plus_minus_m[i]);
+                  1e3 * box.size_tolerance_m[i]);
     text += side;
   }
   return text + " mm";
@@ -128,27 +126,28 @@ void print_frame(const EdgesOptions& options, const std::string& stem, const maq
     line["ms"]["boxes"] = rounded_ms(double(found.all->stats().boxes_ms));
   }
   print_output("%s\n", json_text(line).c_str());
-  flush_output();  // for who reads line by line
+  flush_output();  // the reader may wait for each line
 }
 
 // Runs one source to its end and writes its files.
 void run_source(const EdgesOptions& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::Source& source, maquette::Edges& edges) {
-  const maq_intrinsics intrinsics = intrinsics_of(argument, source);
+  require_intrinsics(argument, source);
   const bool of_clip = is_clip(source);
   ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"),
                 source.info().fps / double(options.limits.every));
   const bool prints = !of_clip || options.json || options.boxes;
   const auto work = [&](const SourceFrame& given) {
-    const maquette::EdgesResult result = edges.run(given.frame, intrinsics);
-    // Drawn before the first file is written, so that a frame has all its files or none.
+    const maquette::EdgesResult result = edges.run(given.frame);
+    // The overlay is drawn before the first file is written, so that a frame has all its files or none.
     const FoundCurves found = find_curves(options, result);
     cv::Mat overlay = options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : cv::Mat();
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
-    make_folder_of(fs::path(options.out) / (given.stem + "_distance.png"));
-    result.save(options.out, given.stem);
-    for (const std::string& format : options.formats) {
-      found.all->save((fs::path(options.out) / (given.stem + "_curves." + format)).string());
+    if (!options.out.empty()) {
+      const fs::path path = fs::path(options.out) / given.stem;
+      make_folder_of(path);
+      result.save(path.string());
+      for (const std::string& format : options.formats) found.all->save(path.string() + "_curves." + format);
     }
     if (options.overlay && of_clip) clip.add(overlay);
     if (options.overlay && !of_clip) {
@@ -173,12 +172,12 @@ int run_edges(const EdgesOptions& options) {
   std::unique_ptr<maquette::Edges> edges;
   const auto load = [&] {
     maq_edges_config config = maquette::default_edges_config();
-    config.bundle_path = bundle.c_str();
-    config.threads = options.network.threads;
-    config.allow_spinning = options.network.no_spin ? 0 : 1;
+    config.model.bundle_path = bundle.c_str();
+    config.model.threads = options.network.threads;
+    config.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
     config.skip_planes = options.skip_planes ? 1 : 0;
     config.average_frames = options.average;
-    config.provider = provider_of(options.network);
+    config.model.provider = provider_of(options.network);
     edges = std::make_unique<maquette::Edges>(context, config);
   };
   const auto run = [&](const SourceArgument& argument, maquette::Source& source) {
@@ -192,49 +191,52 @@ int run_edges(const EdgesOptions& options) {
 void add_edges_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<EdgesOptions>();
   CLI::App* command =
-      app.add_subcommand("edges", "Find sharp edges in frames of a depth camera: their curves, and the sizes of boxes");
-  CLI::Option* const source = command->add_option(
-      "source", options->sources,
-      "Depth pictures, recordings, cameras or stubs: 'image:depth.png?depth_unit=0.001&fov=60' (see "
-      "`maquette sources`)");
-  CLI::Option* const out = command->add_option("-o,--out", options->out, "Folder for the results; created if needed");
-  command->add_flag("--overlay", options->overlay,
-                    "Also draw curves and corners over the depth in colours: <stem>_overlay.png, for clips "
-                    "<stem>_overlay.mp4");
+      app.add_subcommand("edges", "Find sharp edges, their curves, and the sizes of boxes in depth frames");
+  CLI::Option* const source =
+      command->add_option("source", options->sources,
+                          "Depth images, recordings, cameras or stubs: 'image:depth.png?depth_unit=0.001&fov=60' (see "
+                          "`maquette sources`)");
+  CLI::Option* const out = command->add_option(
+      "-o,--out", options->out, "Folder for files, created if needed; without it, results are only printed");
+  command
+      ->add_flag("--overlay", options->overlay,
+                 "Also draw curves and corners over the depth: <stem>_overlay.png, for clips <stem>_overlay.mp4")
+      ->needs(out);
   command
       ->add_option("--format", options->formats,
                    "Also write the curves: json, obj, ply, dxf or step, or several (json,dxf)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"json", "obj", "ply", "dxf", "step"}));
+      ->check(CLI::IsMember({"json", "obj", "ply", "dxf", "step"}))
+      ->needs(out);
   command->add_flag("--boxes", options->boxes, "Also measure boxes: print their sizes, and draw them with --overlay");
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_network_options(*command, options->network, "MAQ_EDGES_BUNDLE");
-  command->add_flag(
-      "--skip-planes", options->skip_planes,
-      "Run the network only where a plane does not explain the depth: faster, may miss flat creases in noise");
+  command->add_flag("--skip-planes", options->skip_planes,
+                    "Skip the network where depth is flat: faster, may miss flat creases in noise");
   command
       ->add_option("--average", options->average,
-                   "Take the mean of so many frames where nothing moves, 2 to 64: of a camera at rest, less noise")
+                   "Average depth over N frames, 2 to 64, to reduce noise; the camera must not move")
       ->check(CLI::Range(2, 64));
   add_frame_limits(*command, options->limits);
   command->footer(
-      "Writes for each frame:\n"
+      "With --out, each frame gives these files:\n"
       "  <stem>_distance.png   16 bits: distance to the nearest sharp edge in thousandths of r, at most 16 r\n"
-      "  <stem>_kind.png       8 bits: 1 where that edge is a crease (both its sides are seen), 2 where it is a\n"
-      "                        boundary (one side is hidden), 0 where none is within 16 r or depth is unknown\n"
+      "  <stem>_kind.png       8 bits: kind of the nearest edge. 1: crease (both sides are visible), 2: boundary (one\n"
+      "                        side is hidden), 0: no edge within 16 r, or depth is unknown\n"
       "  <stem>_edges.json     size, intrinsics and units\n"
-      "  <stem>_curves.<format>  lines, arcs and splines in metres, of the formats that --format names: step and dxf\n"
-      "                        for CAD programs, obj and ply for viewers, json for programs of your own\n"
-      "r is the distance of neighbouring pixels on a surface that faces the camera: depth / focal length, 3 mm at a\n"
-      "metre with 333 px. Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
-      "An overlay shows convex creases yellow, concave ones green, boundaries white, corners red, and boxes with "
-      "their\n"
-      "lengths in millimetres. A box is measured where of each of its three directions an edge is seen from corner to\n"
-      "corner: look at it from above, with a corner towards the camera. +- is two standard deviations.\n\n"
-      "Depth needs a unit and a calibration. Cameras and recordings bring both; pictures are told:\n"
+      "  <stem>_curves.<format>  lines, arcs and splines in metres, one file for each --format: step and dxf for CAD\n"
+      "                        programs, obj and ply for viewers, json for your own programs\n"
+      "r is the distance between neighbouring pixels on a surface that faces the camera: depth / focal length. It is\n"
+      "3 mm at one metre with a focal length of 333 px. Frames of a clip are named <stem>_<frame number>. Files are\n"
+      "written atomically.\n\n"
+      "An overlay shows convex creases yellow, concave ones green, boundaries white and corners red. Boxes have their\n"
+      "lengths in millimetres. To measure a box, look at it from above, with a corner towards the camera. One edge in\n"
+      "each of its three directions must be visible from corner to corner. +- is two standard deviations.\n\n"
+      "Depth needs a unit and a calibration. Cameras and recordings have both. For an image, add them to the URI:\n"
       "  depth_unit=0.001      metres of a stored 1 in a 16-bit PNG or TIFF (1 for metres as floats in a TIFF)\n"
       "  fov=60                horizontal field of view in degrees, or fx=, fy=, cx=, cy= in pixels\n\n"
       "Examples:\n"
+      "  maquette edges 'image:depth.png?depth_unit=0.001&fov=60' --boxes\n"
       "  maquette edges 'image:depth.png?depth_unit=0.001&fov=60' --out results --overlay --boxes\n"
       "  maquette edges 'image:scan.tiff?depth_unit=1&fx=570&fy=570' --out results --format step,dxf\n"
       "  maquette edges 'stub:solids?scene=shelf&noise=tof' --out results --overlay --max-frames 60\n"
@@ -251,9 +253,7 @@ void add_edges_command(CLI::App& app, int* exit_code) {
   add_edges_info_command(*command, exit_code);
   command->callback([=] {
     if (!command->get_subcommands().empty()) return;
-    for (const CLI::Option* needed : {source, out}) {
-      if (needed->empty()) throw CLI::RequiredError(needed->get_name());
-    }
+    if (source->empty()) throw CLI::RequiredError(source->get_name());
     *exit_code = run_edges(*options);
   });
 }

@@ -56,8 +56,8 @@ int build(const BuildOptions& options) {
   }
   if (views.empty()) {
     throw std::runtime_error(options.capture +
-                             " has no depth images, in which edges are found; name one for each frame of its "
-                             "transforms.json as \"depth_file_path\" (16-bit PNG in millimetres, or TIFF in metres).");
+                             " has no depth images, but edges need them. Add \"depth_file_path\" to each frame of its "
+                             "transforms.json (16-bit PNG in millimetres, or TIFF in metres).");
   }
   print_error("%s: %zu of %u views have depth\n", options.capture.c_str(), views.size(), info.view_count);
   make_folder_of(options.out);
@@ -66,13 +66,13 @@ int build(const BuildOptions& options) {
   const int64_t of_views = kStepsOfView * int64_t(views.size());
   Progress progress{ProgressBar("building", of_views + kStepsOfFusion), of_views};
   maq_edges_config of_edges = maquette::default_edges_config();
-  of_edges.bundle_path = bundle.c_str();
-  of_edges.threads = options.network.threads;
-  of_edges.allow_spinning = options.network.no_spin ? 0 : 1;
-  of_edges.provider = provider_of(options.network);
+  of_edges.model.bundle_path = bundle.c_str();
+  of_edges.model.threads = options.network.threads;
+  of_edges.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
+  of_edges.model.provider = provider_of(options.network);
   maquette::Edges edges(context, of_edges);
   maq_edges_fusion_config config = maquette::default_edges_fusion_config();
-  config.threads = std::max(0, options.network.threads);  // which measures nothing
+  config.threads = std::max(0, options.network.threads);  // the fusion cannot measure threads
   config.cell_m = options.cell_m;
   config.min_views = options.min_views;
   config.progress_callback = show_progress;
@@ -82,7 +82,7 @@ int build(const BuildOptions& options) {
     fail_if_interrupted(options.out);
     progress.bar.advance(kStepsOfView * int64_t(i), capture.view(views[i]).name);
     const auto [depth, camera] = capture.load_depth(views[i]);
-    fusion.add_view(edges.run(depth, camera.intrinsics), camera);
+    fusion.add_view(edges.run(depth), camera);
   }
   try {
     fusion.finish();
@@ -107,7 +107,7 @@ int build(const BuildOptions& options) {
 void add_edges_build_command(CLI::App& edges, int* exit_code) {
   auto options = std::make_shared<BuildOptions>();
   CLI::App* command =
-      edges.add_subcommand("build", "Find the sharp edges of a place or a thing from depth images with known cameras");
+      edges.add_subcommand("build", "Find the sharp edges of an object or a room in depth images with known cameras");
   command
       ->add_option("capture", options->capture,
                    "Folder with a transforms.json whose frames name depth images (\"depth_file_path\")")
@@ -125,8 +125,8 @@ void add_edges_build_command(CLI::App& edges, int* exit_code) {
       ->check(CLI::PositiveNumber);
   add_network_options(*command, options->network, "MAQ_EDGES_BUNDLE");
   command->footer(
-      "Curves are in the world of the cameras, in metres. What one view hides another shows; an edge that only one of\n"
-      "three views and more has seen is left out.\n\n"
+      "Curves are in world coordinates of the cameras, in metres. An edge that one view hides may be visible in\n"
+      "another. With three or more views, an edge that only one view shows is dropped.\n\n"
       "Examples:\n"
       "  maquette edges build scan --out model.dxf\n"
       "  maquette edges build scan --out model.step --min-views 3");

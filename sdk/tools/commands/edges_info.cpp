@@ -21,7 +21,7 @@ struct InfoOptions {
   bool json = false;
 };
 
-// What the manifest says of a network that the library has checked.
+// Reads the manifest of a bundle that the library has checked.
 nlohmann::ordered_json describe(const std::string& bundle) {
   std::ifstream file(fs::path(bundle) / "manifest.json");
   const nlohmann::ordered_json manifest = nlohmann::ordered_json::parse(file);
@@ -70,14 +70,14 @@ std::string edges_bundle_or_default(const std::string& given) {
   const std::string bundle = given.empty() ? default_edges_bundle() : given;
   if (bundle.empty()) {
     throw std::runtime_error(
-        "No bundle of the edge network was found; name its folder with --bundle or MAQ_EDGES_BUNDLE.");
+        "No bundle of the edge network was found; set its folder with --bundle or MAQ_EDGES_BUNDLE.");
   }
   return bundle;
 }
 
 void add_edges_info_command(CLI::App& edges, int* exit_code) {
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = edges.add_subcommand("info", "Check the network and print what it is, and its errors");
+  CLI::App* command = edges.add_subcommand("info", "Check the network and print its name, size, licence and errors");
   command->add_option("--bundle", options->bundle, "Its folder; default: MAQ_EDGES_BUNDLE, or the installed one");
   command->add_flag("--json", options->json, "Print it as JSON");
   command->callback([=] { *exit_code = show(*options); });

@@ -113,7 +113,7 @@ int play(const PlayOptions& options) {
   }
   const maq_source_info info = source.info();
   if (statistics.frames() == 0 && failure.empty() && !interrupted()) {
-    failure = options.source + " delivered no frame before it ended or the time was over; dropped frames: " +
+    failure = options.source + " delivered no frame before it ended or the time was up; dropped frames: " +
               std::to_string(info.dropped_frame_count) + ".";
   }
   stopped.reset();
@@ -142,18 +142,17 @@ void add_play_command(CLI::App& app, int* exit_code) {
   command->add_option("-n,--frames", options->frames, "Stop after N frames")->check(CLI::PositiveNumber);
   command->add_option("-t,--seconds", options->seconds, "Stop after this time, in seconds")->check(CLI::PositiveNumber);
   command->add_flag_callback(
-      "--no-picture", [=] { options->picture = false; }, "Print only statistics; default without a terminal");
+      "--no-image", [=] { options->picture = false; }, "Print only statistics; default without a terminal");
 #if MAQ_HAS_PREDICTION
   CLI::Option* conceal = command->add_flag(
       "--conceal", options->conceal, "Fill short gaps with predicted frames; the line below the image marks them");
-  command->add_option("--max-gap", options->max_gap_ms, "Fill gaps of at most this many milliseconds; default: 300")
+  command->add_option("--max-gap", options->max_gap_ms, "Fill gaps of at most N milliseconds; default: 300")
       ->needs(conceal)
       ->check(CLI::Range(1, 10000));
 #endif
   command->add_option("--json", options->json, "Write the statistics to this file");
   command->footer(
-      "Plays frames in real time, also from files. A terminal shows the picture in colour. Missing and late "
-      "frames\n"
+      "Plays frames in real time, also from files. A terminal shows the image in colour. Missing frames, late frames\n"
       "and interruptions are counted:\n\n"
       "  maquette play v4l2:/dev/video0\n"
       "  maquette play take.maqrec --from 5 --speed 0.5\n"

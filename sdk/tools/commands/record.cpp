@@ -37,7 +37,7 @@ int record(const RecordOptions& options) {
   const StoppedByInterrupt stopped(source);
   const maq_source_info info = source.info();
   if (info.frame_count < 0 && info.is_live == 0 && options.frames == 0 && options.seconds == 0) {
-    throw std::runtime_error(argument.uri + " has no end: limit it with --frames or --seconds.");
+    throw std::runtime_error(argument.uri + " has no end; set a limit with --frames or --seconds.");
   }
   maq_recorder_config how{};
   maquette::check(maq_recorder_config_init(&how, sizeof how));
@@ -67,7 +67,7 @@ int record(const RecordOptions& options) {
     progress.advance(done, note);
   }
   progress.finish();
-  if (done == 0) throw std::runtime_error("No frame of " + argument.uri + " came, so nothing was recorded.");
+  if (done == 0) throw std::runtime_error(argument.uri + " delivered no frame, so nothing was recorded.");
   recorder.finish();
   print_output("%s: %" PRId64 " frames, %.1f s, %.1f MB, %" PRIu64 " dropped. To watch it: maquette play %s\n",
                options.out.c_str(), done, double(last_ns - first_ns) / 1e9, double(recorder.info().size_bytes) / 1e6,
@@ -89,10 +89,10 @@ void add_record_command(CLI::App& app, int* exit_code) {
                    "Compress frames as JPEG of this quality, 1 to 100; default: store them unchanged")
       ->check(CLI::Range(1, 100));
   command->add_flag("--keep-predicted", options->keep_predicted,
-                    "Record predicted frames too, marked as such; default: they are an error");
+                    "Also record predicted frames, with a mark; default: they are an error");
   command->footer(
-      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. After a crash or a power cut\n"
-      "it can still be played.\n\n"
+      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. A recording can be played even\n"
+      "after a crash or a power cut.\n\n"
       "  maquette record v4l2:/dev/video0 take.maqrec --seconds 10\n"
       "  maquette densepose take.maqrec --out results --overlay\n"
       "  maquette play 'rec:take.maqrec?from=2&speed=0.5'");

@@ -27,7 +27,7 @@ void print_cameras() {
       maquette::check(maq_camera_list_get_mode(list.get(), i, k, &mode));
       print_output("    %-5s %5d x %-5d", mode.format, mode.width_px, mode.height_px);
       if (mode.fps > 0) print_output(" up to %g frames a second", mode.fps);
-      print_output("%s\n", mode.is_usable == 1 ? "" : "   not understood");
+      print_output("%s\n", mode.is_usable == 1 ? "" : "   not supported");
     }
   }
 }
@@ -40,7 +40,7 @@ int print_sources() {
     maquette::check(maq_source_get_scheme(i, &scheme));
     print_output("  %-38s %s\n", scheme.example, scheme.summary);
   }
-  print_output("\n?size=640x480&fps=15 works with each. In a file name write ? as %%3F.\n");
+  print_output("\n?size=640x480&fps=15 works with each. In a file name, write ? as %%3F.\n");
   print_cameras();
   return 0;
 }
@@ -49,6 +49,6 @@ int print_sources() {
 
 void add_sources_command(CLI::App& app, int* exit_code) {
   CLI::App* command =
-      app.add_subcommand("sources", "List the kinds of sources of this build, and the connected cameras");
+      app.add_subcommand("sources", "List the kinds of sources in this build, and the connected cameras");
   command->callback([=] { *exit_code = print_sources(); });
 }

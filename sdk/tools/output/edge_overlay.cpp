@@ -99,7 +99,7 @@ cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector
   for (int y = 0; y < canvas.rows; ++y) {
     for (int x = 0; x < canvas.cols; ++x) {
       const uint8_t which = kind.at<uint8_t>(y, x);
-      if (which == MAQ_EDGE_NONE) continue;
+      if (which == MAQ_EDGES_KIND_NONE) continue;
       const float from_r = distance.at<float>(y, x);
       cv::Vec3b& pixel = canvas.at<cv::Vec3b>(y, x);
       const auto mix = [&](const cv::Vec3f& colour, float amount) {
@@ -107,7 +107,7 @@ cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector
       };
       const float strength = curves.empty() ? 1 : kFieldStrength;
       mix(kInk, strength * 0.5f * (2 - from_r / kLine_r));
-      mix(which == MAQ_EDGE_CREASE ? kCrease : kBoundary,
+      mix(which == MAQ_EDGES_KIND_CREASE ? kCrease : kBoundary,
           strength * std::clamp(2 * (1.25f - from_r / kLine_r), 0.0f, 1.0f));
     }
   }

@@ -96,7 +96,7 @@ std::vector<uint8_t> nv12_of(const AHardwareBuffer& buffer, int width, int heigh
 
 TEST_F(HardwareBuffers, YuvIsCopiedUnlessItIsNv12InVideoRange) {
   constexpr int kWidth = 9, kHeight = 6;
-  like_.is_full_range = 0;
+  like_.is_video_range = 1;
   for (const auto& [step, u_at] : {std::pair(2u, 0u), std::pair(2u, 1u), std::pair(1u, 0u)}) {
     AHardwareBuffer* const buffer = fake_.make_yuv(kWidth, kHeight, step, u_at);
     const bool is_nv12 = step == 2 && u_at == 0;
@@ -120,7 +120,7 @@ TEST_F(HardwareBuffers, YuvIsCopiedUnlessItIsNv12InVideoRange) {
   like_.rotation_deg = 90;
   EXPECT_EQ(frame(nv12).desc().width_px, kHeight);
   like_.rotation_deg = 0;
-  like_.is_full_range = 1;
+  like_.is_video_range = 0;
   const maquette::Frame scaled = frame(nv12);
   EXPECT_EQ(nv12->locks, 0);
   EXPECT_EQ(scaled.desc().planes[0][3], 16 + (nv12->memory[3] * 219 + 127) / 255);

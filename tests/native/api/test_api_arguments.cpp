@@ -99,18 +99,21 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   maq_frame* frame = nullptr;
   ASSERT_EQ(maq_source_create(context_, "stub:pattern?size=16x16", nullptr, &source), MAQ_OK);
   ASSERT_EQ(maq_source_acquire_frame(source, 0, &frame), MAQ_OK);
-  maq_control_info control{};
+  maq_source_control_info control{};
   control.struct_size = sizeof control;
   maq_intrinsics intrinsics{};
   maq_frame_desc desc{};
   desc.struct_size = sizeof desc;
   int32_t fd = -5;
-  expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, &control), MAQ_ERROR_UNSUPPORTED, source, "no control");
-  expect_error(maq_source_set_control(source, MAQ_CONTROL_GAIN, 1), MAQ_ERROR_UNSUPPORTED, source, "no control");
-  expect_error(maq_source_set_control(source, MAQ_CONTROL_GAIN, 0.0 / 0.0), MAQ_ERROR_INVALID_ARGUMENT, source,
+  expect_error(maq_source_get_control(source, MAQ_SOURCE_CONTROL_GAIN, &control), MAQ_ERROR_UNSUPPORTED, source,
+               "no control");
+  expect_error(maq_source_set_control(source, MAQ_SOURCE_CONTROL_GAIN, 1), MAQ_ERROR_UNSUPPORTED, source, "no control");
+  expect_error(maq_source_set_control(source, MAQ_SOURCE_CONTROL_GAIN, 0.0 / 0.0), MAQ_ERROR_INVALID_ARGUMENT, source,
                "value");
-  expect_error(maq_source_set_control(source, maq_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source, "control is 0");
-  expect_error(maq_source_get_control(source, MAQ_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source, "info");
+  expect_error(maq_source_set_control(source, maq_source_control(0), 1), MAQ_ERROR_INVALID_ARGUMENT, source,
+               "control is 0");
+  expect_error(maq_source_get_control(source, MAQ_SOURCE_CONTROL_GAIN, nullptr), MAQ_ERROR_INVALID_ARGUMENT, source,
+               "info");
   expect_error(maq_source_get_intrinsics(source, &intrinsics), MAQ_ERROR_UNSUPPORTED, source, "intrinsics");
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
   expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
@@ -125,8 +128,8 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
   maq_frame_release(frame);
   maq_source_destroy(source);
   for (const maq_status status :
-       {maq_source_get_control(nullptr, MAQ_CONTROL_GAIN, &control),
-        maq_source_set_control(nullptr, MAQ_CONTROL_GAIN, 1), maq_source_get_intrinsics(nullptr, &intrinsics),
+       {maq_source_get_control(nullptr, MAQ_SOURCE_CONTROL_GAIN, &control),
+        maq_source_set_control(nullptr, MAQ_SOURCE_CONTROL_GAIN, 1), maq_source_get_intrinsics(nullptr, &intrinsics),
         maq_source_seek(nullptr, 0), maq_frame_get_depth(nullptr, &desc), maq_frame_get_dma_buf(nullptr, &fd)}) {
     EXPECT_EQ(status, MAQ_ERROR_INVALID_ARGUMENT);
   }
@@ -202,7 +205,7 @@ TEST_F(ApiArguments, ValuesOutOfRangeAreRefusedByName) {
   maq_source_config source_config;
   maq_source_config_init(&source_config, sizeof source_config);
   maq_source* source = nullptr;
-  for (const uint32_t pool : {0u, 65u}) {
+  for (const uint32_t pool : {65u, 100u}) {
     source_config.frame_pool_size = pool;
     expect_error(maq_source_create(context_, "stub:people", &source_config, &source), MAQ_ERROR_INVALID_ARGUMENT,
                  context_, "config.frame_pool_size is " + std::to_string(pool));
@@ -287,7 +290,7 @@ TEST_F(ApiArguments, FieldsOfAConfigInAConfigAreNamedWithBoth) {
     maq_pipeline* pipeline = nullptr;
     expect_error(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT, nullptr, text);
   };
-  expect_source_refused("config.source.queue_length is 0", [](auto& source) { source.queue_length = 0; });
+  expect_source_refused("config.source.queue_length is 65", [](auto& source) { source.queue_length = 65; });
   expect_source_refused("config.source.struct_size is 1", [](auto& source) { source.struct_size = 1; });
 }
 

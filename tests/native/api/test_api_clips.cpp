@@ -115,7 +115,7 @@ TEST_F(ApiClips, AfterTheEndNothingCanBeAdded) {
   maquette::Clip clip(context_, folder_.file("a.mp4"), 10);
   std::string text;
   EXPECT_EQ(status_of([&] { clip.finish(); }, &text), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_NE(text.find("has no picture yet"), std::string::npos) << text;
+  EXPECT_NE(text.find("has no image yet"), std::string::npos) << text;
   clip.add(picture(0));
   clip.finish();
   clip.finish();  // does nothing

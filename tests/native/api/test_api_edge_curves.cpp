@@ -23,7 +23,7 @@ double distance(const double* a, const double* b) { return std::hypot(a[0] - b[0
 struct SeenCarton {
   SeenCarton() {
     while (result.size() < 8) {
-      result.push_back(edges.run(*source.next(), *source.intrinsics()));
+      result.push_back(edges.run(*source.next()));
       curves.push_back(result.back().find_curves());
       if (!curves.back().boxes().empty()) break;
     }
@@ -38,8 +38,8 @@ struct SeenCarton {
  private:
   static maq_edges_config config() {
     maq_edges_config made = maquette::default_edges_config();
-    made.bundle_path = MAQ_TEST_MODELS "/edges-int8";
-    made.threads = 1;
+    made.model.bundle_path = MAQ_TEST_MODELS "/edges-int8";
+    made.model.threads = 1;
     made.result_pool_size = 8;
     return made;
   }
@@ -73,8 +73,8 @@ TEST_F(ApiEdgeCurves, ABoxHasItsSize) {
   const double truth[] = {0.441, 0.427, 0.411};
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(box.size_m[i], truth[i], 0.02);
-    EXPECT_GT(box.plus_minus_m[i], 0);
-    EXPECT_LT(box.plus_minus_m[i], 0.1);
+    EXPECT_GT(box.size_tolerance_m[i], 0);
+    EXPECT_LT(box.size_tolerance_m[i], 0.1);
     for (size_t k = 0; k < 3; ++k) {
       const double* a = box.axes[i];
       const double* b = box.axes[k];
@@ -95,7 +95,7 @@ TEST_F(ApiEdgeCurves, CurvesHaveTheirPointsAndCorners) {
   bool is_bent = false, is_beside = false;
   for (const maq_edges_curve& curve : all) {
     ASSERT_GE(curve.point_count, 2u);
-    EXPECT_TRUE(curve.kind == MAQ_EDGE_CREASE || curve.kind == MAQ_EDGE_BOUNDARY);
+    EXPECT_TRUE(curve.kind == MAQ_EDGES_KIND_CREASE || curve.kind == MAQ_EDGES_KIND_BOUNDARY);
     double length_m = 0;
     for (uint32_t i = 1; i < curve.point_count; ++i) {
       length_m += distance(curve.points_m + 3 * (i - 1), curve.points_m + 3 * i);
@@ -107,9 +107,9 @@ TEST_F(ApiEdgeCurves, CurvesHaveTheirPointsAndCorners) {
     EXPECT_EQ(curve.controls_m != nullptr, curve.type == MAQ_EDGES_CURVE_SPLINE);
     EXPECT_EQ(curve.control_count >= 4, curve.type == MAQ_EDGES_CURVE_SPLINE);
     EXPECT_EQ(curve.sweep_rad > 0, curve.type == MAQ_EDGES_CURVE_ARC);
-    is_bent = is_bent || curve.bend == MAQ_EDGE_BEND_CONVEX;
+    is_bent = is_bent || curve.convexity == MAQ_EDGES_CONVEXITY_CONVEX;
     for (size_t i = 0; i < 2; ++i) {
-      const maq_edges_side& side = curve.sides[i];
+      const maq_edges_adjacent_plane& side = curve.adjacent_planes[i];
       if (side.is_known == 1) {
         is_beside = true;
         EXPECT_NEAR(std::hypot(side.normal[0], side.normal[1], side.normal[2]), 1, 1e-9);
@@ -180,7 +180,7 @@ TEST_F(ApiEdgeCurves, BetweenEdgesThereIsThePlaneOfThePixelAndOfTheRay) {
       const maq_edges_snap snap = curves().snap_to_pixel(x, y, 4);
       if (snap.target != MAQ_EDGES_SNAP_PLANE) continue;
       ++planes;
-      const maq_edges_side& side = all[size_t(snap.index)].sides[snap.side];
+      const maq_edges_adjacent_plane& side = all[size_t(snap.index)].adjacent_planes[snap.adjacent_plane_index];
       ASSERT_EQ(side.is_known, 1);
       const double* p = snap.point_m;
       EXPECT_NEAR(side.normal[0] * p[0] + side.normal[1] * p[1] + side.normal[2] * p[2], side.offset_m, 1e-9);
@@ -202,25 +202,23 @@ TEST_F(ApiEdgeCurves, BetweenEdgesThereIsThePlaneOfThePixelAndOfTheRay) {
 
 TEST_F(ApiEdgeCurves, OptionsAreThoseOfTheExtractorAndChecked) {
   maq_edges_curves_config config = maquette::default_edges_curves_config();
-  EXPECT_EQ(config.max_curves, 1024);
-  EXPECT_EQ(config.find_boxes, 1);
-  config.find_boxes = 0;
+  EXPECT_EQ(config.skip_boxes, 0);
+  config.skip_boxes = 1;
   const maquette::EdgesCurves without = result().find_curves(config);
   EXPECT_EQ(without.curves().size(), curves().curves().size());
   EXPECT_TRUE(without.boxes().empty());
-  config.max_curves = 3;
-  const maquette::EdgesCurves three = result().find_curves(config);
-  EXPECT_EQ(three.curves().size(), 3u);
-  EXPECT_GT(three.stats().over_limit_count, 0);
+  const maq_edges_curves_config explicit_defaults = {sizeof config, 4, 0.35F, 3, 8, 15, 10, 0};
+  const std::vector<maq_edges_curve> same = result().find_curves(explicit_defaults).curves();
+  ASSERT_EQ(same.size(), curves().curves().size());
+  for (size_t i = 0; i < same.size(); ++i) EXPECT_EQ(same[i].length_m, curves().curves()[i].length_m);
   config = maquette::default_edges_curves_config();
   config.min_length_px = 600;
   EXPECT_LT(result().find_curves(config).curves().size(), curves().curves().size());
 
-  float* const numbers[] = {&config.select_px,   &config.min_votes, &config.smear_px,
-                            &config.support_px,  &config.break_deg, &config.min_length_px,
-                            &config.tolerance_r, &config.gap_r,     &config.join_px};
-  const char* const names[] = {"select_px",     "min_votes",   "smear_px", "support_px", "break_deg",
-                               "min_length_px", "tolerance_r", "gap_r",    "join_px"};
+  float* const numbers[] = {&config.vote_radius_px, &config.min_votes,       &config.flying_pixel_band_px,
+                            &config.fit_band_px,    &config.split_angle_deg, &config.min_length_px};
+  const char* const names[] = {"vote_radius_px", "min_votes",       "flying_pixel_band_px",
+                               "fit_band_px",    "split_angle_deg", "min_length_px"};
   for (size_t i = 0; i < std::size(numbers); ++i) {
     for (const float wrong : {-1.0f, std::numeric_limits<float>::quiet_NaN(), 1e9f}) {
       config = maquette::default_edges_curves_config();
@@ -229,11 +227,8 @@ TEST_F(ApiEdgeCurves, OptionsAreThoseOfTheExtractorAndChecked) {
     }
   }
   config = maquette::default_edges_curves_config();
-  config.max_curves = 0;
-  expect_refused(config, "max_curves is 0");
-  config = maquette::default_edges_curves_config();
-  config.find_boxes = 2;
-  expect_refused(config, "config.find_boxes is 2");
+  config.skip_boxes = 2;
+  expect_refused(config, "config.skip_boxes is 2");
   config = maquette::default_edges_curves_config();
   config.struct_size = 4;
   expect_refused(config, "config.struct_size is 4");
@@ -294,7 +289,7 @@ TEST_F(ApiEdgeCurves, AreBoundedReusedAndOutliveTheResult) {
     const maquette::Context context;
     maquette::Edges edges(context, MAQ_TEST_MODELS "/edges-int8");  // a pool of 4
     maquette::Source source(context, "stub:solids?scene=box&seed=1&size=320x240");
-    const maquette::EdgesResult seen = edges.run(*source.next(), *source.intrinsics());
+    const maquette::EdgesResult seen = edges.run(*source.next());
     for (int i = 0; i < 4; ++i) held.push_back(seen.find_curves());
     maq_edges_curves* found = nullptr;
     EXPECT_EQ(maq_edges_result_find_curves(seen.get(), nullptr, &found), MAQ_ERROR_POOL_EMPTY);
@@ -307,7 +302,7 @@ TEST_F(ApiEdgeCurves, AreBoundedReusedAndOutliveTheResult) {
         << maq_last_error(nullptr);
     // Those that were refused go back.
     maq_edges_curves_config config = maquette::default_edges_curves_config();
-    config.gap_r = -1;
+    config.min_votes = -1;
     for (int i = 0; i < 5; ++i) {
       EXPECT_EQ(maq_edges_result_find_curves(seen.get(), &config, &found), MAQ_ERROR_INVALID_ARGUMENT);
     }

@@ -30,24 +30,23 @@ struct DepthImage {
     desc.width_px = width;
     desc.height_px = height;
     desc.planes[0] = reinterpret_cast<const uint8_t*>(pixels.data());
-    intrinsics = {width, height, 80, 85, (width - 1) / 2.0, (height - 1) / 2.0, {}};
+    desc.intrinsics = {width, height, 80, 85, (width - 1) / 2.0, (height - 1) / 2.0, {}};
   }
   std::vector<uint16_t> pixels;
   maq_frame_desc desc;
-  maq_intrinsics intrinsics{};
 };
 
 class ApiEdges : public testing::Test {
  protected:
-  maq_status run(const maq_frame* given, const maq_intrinsics* intrinsics) {
+  maq_status run(const maq_frame* given) {
     maq_edges_result* result = nullptr;
-    const maq_status status = maq_edges_run(edges.get(), given, intrinsics, &result);
+    const maq_status status = maq_edges_run(edges.get(), given, &result);
     EXPECT_EQ(result != nullptr, status == MAQ_OK);
     maq_edges_result_release(result);
     return status;
   }
-  void expect_refused(maq_status status, const char* text, const maq_frame* given, const maq_intrinsics* intrinsics) {
-    EXPECT_EQ(run(given, intrinsics), status);
+  void expect_refused(maq_status status, const char* text, const maq_frame* given) {
+    EXPECT_EQ(run(given), status);
     EXPECT_NE(std::strstr(maq_last_error(edges.get()), text), nullptr) << maq_last_error(edges.get());
   }
 
@@ -58,11 +57,11 @@ class ApiEdges : public testing::Test {
 };
 
 TEST_F(ApiEdges, GivesTheFieldItsCameraAndStats) {
-  const maquette::EdgesResult result = edges.run(frame, image.intrinsics);
+  const maquette::EdgesResult result = edges.run(frame);
   EXPECT_EQ(result.width_px(), 96);
   EXPECT_EQ(result.height_px(), 72);
   EXPECT_EQ(result.field().eps_r, 16);
-  EXPECT_EQ(std::memcmp(&result.field().intrinsics, &image.intrinsics, sizeof image.intrinsics), 0);
+  EXPECT_EQ(std::memcmp(&result.field().intrinsics, &image.desc.intrinsics, sizeof(maq_intrinsics)), 0);
   const std::vector<float> metres = result.distance_m();
   int64_t known = 0;
   for (size_t i = 0; i < image.pixels.size(); ++i) {
@@ -70,8 +69,8 @@ TEST_F(ApiEdges, GivesTheFieldItsCameraAndStats) {
     known += depth > 0;
     ASSERT_EQ(result.depth_m()[i], depth);
     ASSERT_NEAR(metres[i], result.distance_r()[i] * r, 1e-6);
-    ASSERT_EQ(result.kind()[i] == MAQ_EDGE_NONE, result.distance_r()[i] == 16);
-    ASSERT_GT(result.spread_r()[i], 0);
+    ASSERT_EQ(result.kind()[i] == MAQ_EDGES_KIND_NONE, result.distance_r()[i] == 16);
+    ASSERT_GT(result.expected_error_r()[i], 0);
   }
   const maq_edges_stats stats = result.stats();
   EXPECT_EQ(stats.known_pixel_count, known);
@@ -88,24 +87,23 @@ TEST_F(ApiEdges, FramesWithoutDepthOrCalibrationAreASentence) {
   desc.format = MAQ_PIXEL_GREY8;
   desc.planes[0] = grey.data();
   const maquette::Frame picture(context, desc);
-  expect_refused(MAQ_ERROR_UNSUPPORTED, "depth frames (DEPTH16, DEPTH32F)", picture.get(), &image.intrinsics);
-  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "intrinsics is NULL", frame.get(), nullptr);
-  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "frame is NULL", nullptr, &image.intrinsics);
-  maq_intrinsics wrong = image.intrinsics;
-  wrong.width_px = 640;
-  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "camera of 640 x 72 pixels", frame.get(), &wrong);
-  wrong = image.intrinsics;
-  wrong.fx_px = 0;
-  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "fx_px of the intrinsics is 0", frame.get(), &wrong);
-  EXPECT_EQ(run(frame.get(), &image.intrinsics), MAQ_OK);
-  EXPECT_EQ(maq_edges_run(nullptr, frame.get(), &image.intrinsics, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_edges_run(edges.get(), frame.get(), &image.intrinsics, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  expect_refused(MAQ_ERROR_UNSUPPORTED, "depth frames (DEPTH16, DEPTH32F)", picture.get());
+  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "frame is NULL", nullptr);
+  desc = image.desc;
+  desc.intrinsics = {};
+  expect_refused(MAQ_ERROR_UNSUPPORTED, "does not carry the intrinsics", maquette::Frame(context, desc).get());
+  desc = image.desc;
+  desc.intrinsics.fx_px = 0;
+  expect_refused(MAQ_ERROR_INVALID_ARGUMENT, "fx_px of the intrinsics is 0", maquette::Frame(context, desc).get());
+  EXPECT_EQ(run(frame.get()), MAQ_OK);
+  EXPECT_EQ(maq_edges_run(nullptr, frame.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_edges_run(edges.get(), frame.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiEdges, WrongBundlesAreASentence) {
   const auto refused = [&](const std::string& path, maq_status status, const char* text) {
     maq_edges_config config = maquette::default_edges_config();
-    config.bundle_path = path.c_str();
+    config.model.bundle_path = path.c_str();
     maq_edges* made = nullptr;
     EXPECT_EQ(maq_edges_create(context.get(), &config, &made), status);
     EXPECT_EQ(made, nullptr);
@@ -128,24 +126,24 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
     EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
   };
   maq_edges_config config = maquette::default_edges_config();
-  config.threads = -2;
-  refused(config, "config.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).");
-  config.threads = 65;
-  refused(config, "config.threads is 65");
+  config.model.threads = -2;
+  refused(config, "config.model.threads is -2, but must be 0 to 64, or MAQ_THREADS_MEASURED (-1).");
+  config.model.threads = 65;
+  refused(config, "config.model.threads is 65");
   config = maquette::default_edges_config();
-  config.result_pool_size = 0;
+  config.result_pool_size = 65;
   refused(config, "config.result_pool_size");
   config = maquette::default_edges_config();
-  config.allow_spinning = 2;
-  refused(config, "config.allow_spinning");
+  reinterpret_cast<int32_t&>(config.model.spinning) = 3;
+  refused(config, "config.model.spinning");
   for (const int32_t frames : {-1, 65}) {
     config = maquette::default_edges_config();
     config.average_frames = frames;
     refused(config, "config.average_frames");
   }
   config = maquette::default_edges_config();
-  reinterpret_cast<int32_t&>(config.provider) = 9;
-  refused(config, "config.provider");
+  reinterpret_cast<int32_t&>(config.model.provider) = 9;
+  refused(config, "config.model.provider");
   config = maquette::default_edges_config();
   config.struct_size = 4;
   refused(config, "config.struct_size is 4");
@@ -155,11 +153,11 @@ TEST_F(ApiEdges, SettingsOutOfRangeAreRefused) {
 
 TEST_F(ApiEdges, MeasuredThreadsAreAFewAndGiveTheSame) {
   maq_edges_config config = maquette::default_edges_config();
-  config.bundle_path = kEdgesBundle;
-  config.threads = 3;
-  const maquette::EdgesResult expected = maquette::Edges(context, config).run(frame, image.intrinsics);
-  config.threads = MAQ_THREADS_MEASURED;
-  const maquette::EdgesResult found = maquette::Edges(context, config).run(frame, image.intrinsics);
+  config.model.bundle_path = kEdgesBundle;
+  config.model.threads = 3;
+  const maquette::EdgesResult expected = maquette::Edges(context, config).run(frame);
+  config.model.threads = MAQ_THREADS_MEASURED;
+  const maquette::EdgesResult found = maquette::Edges(context, config).run(frame);
   EXPECT_EQ(expected.stats().threads, 3);
   EXPECT_EQ(expected.stats().is_threads_measured, 0);
   EXPECT_GE(found.stats().threads, 1);
@@ -171,12 +169,12 @@ TEST_F(ApiEdges, MeasuredThreadsAreAFewAndGiveTheSame) {
 
 TEST_F(ApiEdges, FramesAtRestAreAveragedWhenAskedFor) {
   maq_edges_config config = maquette::default_edges_config();
-  config.bundle_path = kEdgesBundle;
+  config.model.bundle_path = kEdgesBundle;
   for (const int32_t frames : {0, 1, 4}) {
     config.average_frames = frames;
     maquette::Edges edges_at_rest(context, config);
-    edges_at_rest.run(frame, image.intrinsics);
-    const maq_edges_stats stats = edges_at_rest.run(frame, image.intrinsics).stats();
+    edges_at_rest.run(frame);
+    const maq_edges_stats stats = edges_at_rest.run(frame).stats();
     EXPECT_EQ(stats.averaged_pixel_count, frames == 4 ? stats.known_pixel_count : 0);
   }
 }
@@ -189,12 +187,11 @@ TEST_F(ApiEdges, ABundleInMemoryGivesTheSame) {
   std::vector<maq_memory_file> files;
   for (const auto& [name, bytes] : contents) files.push_back({name.c_str(), bytes.data(), bytes.size()});
   maq_edges_config config = maquette::default_edges_config();
-  config.bundle_files = files.data();
-  config.bundle_file_count = uint32_t(files.size());
+  config.model.bundle_files = files.data();
+  config.model.bundle_file_count = uint32_t(files.size());
   maquette::Edges in_memory(context, config);
   for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
-  const maquette::EdgesResult found = in_memory.run(frame, image.intrinsics),
-                              expected = edges.run(frame, image.intrinsics);
+  const maquette::EdgesResult found = in_memory.run(frame), expected = edges.run(frame);
   EXPECT_EQ(std::memcmp(found.distance_r(), expected.distance_r(), image.pixels.size() * sizeof(float)), 0);
 }
 
@@ -203,25 +200,28 @@ TEST_F(ApiEdges, ResultsAreBoundedReusedAndOutliveEverything) {
   {
     const maquette::Context another;
     maquette::Edges made(another, kEdgesBundle);
-    for (int i = 0; i < 4; ++i) held.push_back(made.run(frame, image.intrinsics));
+    for (int i = 0; i < 4; ++i) held.push_back(made.run(frame));
     maq_edges_result* result = nullptr;
-    EXPECT_EQ(maq_edges_run(made.get(), frame.get(), &image.intrinsics, &result), MAQ_ERROR_POOL_EMPTY);
+    EXPECT_EQ(maq_edges_run(made.get(), frame.get(), &result), MAQ_ERROR_POOL_EMPTY);
     held.pop_back();
-    held.push_back(made.run(frame, image.intrinsics));
+    held.push_back(made.run(frame));
     // A result whose frame was refused goes back to the pool.
+    maq_frame_desc desc = image.desc;
+    desc.intrinsics = {};
+    const maquette::Frame uncalibrated(another, desc);
     held.pop_back();
     for (int i = 0; i < 9; ++i) {
-      EXPECT_EQ(maq_edges_run(made.get(), frame.get(), nullptr, &result), MAQ_ERROR_INVALID_ARGUMENT);
+      EXPECT_EQ(maq_edges_run(made.get(), uncalibrated.get(), &result), MAQ_ERROR_UNSUPPORTED);
       made.cancel();
-      EXPECT_EQ(maq_edges_run(made.get(), frame.get(), &image.intrinsics, &result), MAQ_CANCELLED);
+      EXPECT_EQ(maq_edges_run(made.get(), frame.get(), &result), MAQ_CANCELLED);
     }
-    held.push_back(made.run(frame, image.intrinsics));
+    held.push_back(made.run(frame));
   }
   for (const maquette::EdgesResult& result : held) EXPECT_EQ(result.depth_m()[5], float(image.pixels[5]) * 0.001f);
 }
 
 TEST_F(ApiEdges, WhatIsAskedOfAResultIsChecked) {
-  const maquette::EdgesResult result = edges.run(frame, image.intrinsics);
+  const maquette::EdgesResult result = edges.run(frame);
   const void* values = nullptr;
   size_t stride = 0;
   for (const int plane : {0, 5, -1}) {
@@ -257,8 +257,8 @@ TEST_F(ApiEdges, WhatIsAskedOfAResultIsChecked) {
 TEST_F(ApiEdges, SavesTheFieldAsFiles) {
   const TempFolder folder;
   const std::string path = folder.path().string();
-  const maquette::EdgesResult result = edges.run(frame, image.intrinsics);
-  result.save(path, "a");
+  const maquette::EdgesResult result = edges.run(frame);
+  result.save(path + "/a");
   const auto document = nlohmann::json::parse(read_text(folder.file("a_edges.json")));
   EXPECT_EQ(document["width"], 96);
   EXPECT_EQ(document["height"], 72);
@@ -284,18 +284,17 @@ TEST_F(ApiEdges, SavesTheFieldAsFiles) {
 TEST_F(ApiEdges, FilesThatCannotBeWrittenLeaveWhatWasThere) {
   const TempFolder folder;
   const std::string path = folder.path().string();
-  const maquette::EdgesResult result = edges.run(frame, image.intrinsics);
-  for (const char* stem : {"", "a/b"}) {
-    EXPECT_EQ(maq_edges_result_save(result.get(), path.c_str(), stem), MAQ_ERROR_INVALID_ARGUMENT);
+  const maquette::EdgesResult result = edges.run(frame);
+  for (const std::string& wrong : {std::string(), path + "/"}) {
+    EXPECT_EQ(maq_edges_result_save(result.get(), wrong.c_str()), MAQ_ERROR_INVALID_ARGUMENT) << wrong;
   }
-  EXPECT_EQ(maq_edges_result_save(result.get(), "/nowhere", "a"), MAQ_ERROR_UNWRITABLE);
-  EXPECT_EQ(maq_edges_result_save(nullptr, "a", "a"), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_edges_result_save(result.get(), nullptr, "a"), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_edges_result_save(result.get(), "a", nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_edges_result_save(result.get(), "/nowhere/a"), MAQ_ERROR_UNWRITABLE);
+  EXPECT_EQ(maq_edges_result_save(nullptr, "a"), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_edges_result_save(result.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   for (const char* name : {"a_distance.png", "a_kind.png", "a_edges.json"}) write_text(folder.file(name), name);
   {
     const FileSizeLimit limit(100);
-    EXPECT_EQ(maq_edges_result_save(result.get(), path.c_str(), "a"), MAQ_ERROR_UNWRITABLE);
+    EXPECT_EQ(maq_edges_result_save(result.get(), (path + "/a").c_str()), MAQ_ERROR_UNWRITABLE);
   }
   for (const char* name : {"a_distance.png", "a_kind.png", "a_edges.json"}) {
     EXPECT_EQ(read_text(folder.file(name)), name);

@@ -17,11 +17,11 @@ class ApiEdgesFusion : public testing::Test {
  protected:
   ApiEdgesFusion() {
     maq_edges_config config = maquette::default_edges_config();
-    config.bundle_path = MAQ_TEST_MODELS "/edges-int8";
-    config.threads = 1;
+    config.model.bundle_path = MAQ_TEST_MODELS "/edges-int8";
+    config.model.threads = 1;
     edges_.emplace(context_, config);
     frame_ = source_.next();
-    result_.emplace(edges_->run(*frame_, *source_.intrinsics()));
+    result_.emplace(edges_->run(*frame_));
     camera_.struct_size = sizeof camera_;
     camera_.intrinsics = *source_.intrinsics();
     for (const int i : {0, 4, 8}) camera_.rotation[i] = 1;
@@ -69,9 +69,21 @@ TEST_F(ApiEdgesFusion, AViewBecomesPointsAndCurvesOfTheWorld) {
   maq_edges_snap snap{};
   snap.struct_size = sizeof snap;
   EXPECT_EQ(maq_edges_curves_snap_to_pixel(fused.get(), 1, 1, 8, &snap), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_STREQ(maq_last_error(nullptr),
-               "maq_edges_curves_snap_to_pixel: curves are of several views, which have no pixels in common; use "
-               "maq_edges_curves_snap_to_ray.");
+  EXPECT_STREQ(
+      maq_last_error(nullptr),
+      "maq_edges_curves_snap_to_pixel: curves come from a fusion of several views, which have no common pixels; use "
+      "maq_edges_curves_snap_to_ray.");
+}
+
+TEST_F(ApiEdgesFusion, AnEmptyCameraTakesTheIntrinsicsOfTheResult) {
+  maquette::EdgesFusion given(context_), taken(context_);
+  given.add_view(*result_, camera_);
+  camera_.intrinsics = {};
+  taken.add_view(*result_, camera_);
+  given.finish();
+  taken.finish();
+  ASSERT_EQ(taken.points().size(), given.points().size());
+  EXPECT_EQ(taken.points()[0].distance_m, given.points()[0].distance_m);
 }
 
 TEST_F(ApiEdgesFusion, ProgressGoesUpAndEndsIt) {
@@ -121,7 +133,7 @@ TEST_F(ApiEdgesFusion, WhatIsWrongWithAViewIsSaid) {
   fusion.finish();
   maq_edges_fusion_point point{};
   EXPECT_EQ(maq_edges_fusion_copy_points(fusion.get(), &point, 1), MAQ_ERROR_INVALID_ARGUMENT);
-  config.min_views = 0;
+  config.min_views = -1;
   maq_edges_fusion* made = nullptr;
   EXPECT_EQ(maq_edges_fusion_create(context_.get(), &config, &made), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(made, nullptr);
@@ -155,6 +167,7 @@ TEST_F(ApiEdgesFusion, CapturesBringDepthAndItsCamera) {
   const auto [depth, camera] = capture.load_depth(0);
   EXPECT_EQ(depth.desc().width_px, 320);
   EXPECT_EQ(camera.intrinsics.width_px, 320);
+  EXPECT_EQ(depth.intrinsics()->fx_px, camera.intrinsics.fx_px);
   EXPECT_DOUBLE_EQ(camera.intrinsics.fx_px, 300);
   EXPECT_DOUBLE_EQ(camera.centre[2], 3);
   frame.erase("depth_file_path");

@@ -278,7 +278,7 @@ TEST(ApiFrames, AreMadeOfImagesInPlanesInEitherRangeAndRotated) {
   EXPECT_EQ(full.desc().timestamp_ns, 7);
   EXPECT_EQ(full.desc().sequence, 3u);
   EXPECT_EQ(full.desc().clock, MAQ_CLOCK_MONOTONIC);
-  image.desc.is_full_range = 0;
+  image.desc.is_video_range = 1;
   EXPECT_EQ(nv12_of(maquette::Frame::convert_yuv(context, image.desc)),
             (Bytes{0, 51, 102, 153, 204, 255, 128, 64, 0, 255, 64, 128}));
   image.desc.rotation_deg = 90;
@@ -319,7 +319,7 @@ TEST(ApiFrames, AreNotMadeOfPlanesThatCannotBe) {
   });
   expect_refused("image.rotation_deg is 45", invalid, [](auto& image) { image.rotation_deg = 45; });
   expect_refused("image.rotation_deg is -90", invalid, [](auto& image) { image.rotation_deg = -90; });
-  expect_refused("image.is_full_range is 2", invalid, [](auto& image) { image.is_full_range = 2; });
+  expect_refused("image.is_video_range is 2", invalid, [](auto& image) { image.is_video_range = 2; });
   expect_refused("image.clock is 0", invalid, [](auto& image) { image.clock = maq_clock(0); });
   expect_refused("image.struct_size", invalid, [](auto& image) { image.struct_size -= 1; });
   expect_refused("The image is 0 x 2", MAQ_ERROR_IMAGE_SIZE, [](auto& image) { image.width_px = 0; });

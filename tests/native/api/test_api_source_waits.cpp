@@ -79,9 +79,9 @@ TEST_F(ApiSourceWaits, AStoppedSourceGivesNoMoreFrames) {
     EXPECT_EQ(maq_source_acquire_frame(source.get(), 0, &frame), MAQ_CANCELLED) << uri;
     source.stop();
     EXPECT_EQ(source.info().frame_pool_size, 4u);
-    maq_control_info info{};
+    maq_source_control_info info{};
     info.struct_size = sizeof info;
-    const maq_status status = maq_source_get_control(source.get(), MAQ_CONTROL_GAIN, &info);
+    const maq_status status = maq_source_get_control(source.get(), MAQ_SOURCE_CONTROL_GAIN, &info);
     EXPECT_EQ(status, source.info().is_live == 1 ? MAQ_CANCELLED : MAQ_ERROR_UNSUPPORTED) << uri;
   }
   EXPECT_EQ(maq_source_stop(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
@@ -147,7 +147,7 @@ TEST_F(ApiSourceWaits, AnEventTellsOfAStopAndOfALoss) {
   EXPECT_TRUE(is_readable(fd, 0));
 
   maq_source_config config = maquette::default_source_config();
-  config.reconnect_ms = 0;
+  config.reconnect_ms = MAQ_NO_RECONNECT;
   maquette::Source lost(context_, "stub:pattern?size=16x16&live=1&unplug=@0", &config);
   EXPECT_TRUE(is_readable(*lost.event_fd(), 60000));
   maq_frame* frame = nullptr;

@@ -207,11 +207,11 @@ TEST(ApiSources, LargePicturesAreMadeSmallerWhenTheConfigSaysSo) {
 TEST(ApiSources, OnlyCamerasHaveControls) {
   const maquette::Context context;
   maquette::Source source(context, "stub:pattern?size=16x16");
-  EXPECT_FALSE(source.control(MAQ_CONTROL_GAIN).has_value());
+  EXPECT_FALSE(source.control(MAQ_SOURCE_CONTROL_GAIN).has_value());
   for (const auto& [value, status] :
        {std::pair(1.0, MAQ_ERROR_UNSUPPORTED), std::pair(double(NAN), MAQ_ERROR_INVALID_ARGUMENT)}) {
     try {
-      source.set_control(MAQ_CONTROL_GAIN, value);
+      source.set_control(MAQ_SOURCE_CONTROL_GAIN, value);
       ADD_FAILURE() << value;
     } catch (const maquette::Error& error) {
       EXPECT_EQ(error.status(), status) << error.what();

@@ -161,18 +161,17 @@ TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
   const maquette::Context context;
   for (const int32_t skip_planes : {0, 1}) {
     maq_edges_config config = maquette::default_edges_config();
-    config.bundle_path = MAQ_TEST_DATA "/tiny_edges/bundle";
+    config.model.bundle_path = MAQ_TEST_DATA "/tiny_edges/bundle";
     config.skip_planes = skip_planes;
     config.average_frames = 8;
     maquette::Edges edges(context, config);
     maquette::Source source(context, "stub:solids?scene=box&noise=tof");
-    const maq_intrinsics intrinsics = *source.intrinsics();
     std::vector<maquette::Frame> frames;
     for (int i = 0; i < 3; ++i) frames.push_back(std::move(*source.next()));
     const auto run = [&](int count) {
       for (int i = 0; i < count; ++i) {
         maq_edges_result* result = nullptr;
-        ASSERT_EQ(maq_edges_run(edges.get(), frames[size_t(i) % 3].get(), &intrinsics, &result), MAQ_OK);
+        ASSERT_EQ(maq_edges_run(edges.get(), frames[size_t(i) % 3].get(), &result), MAQ_OK);
         maq_edges_result_release(result);
       }
     };

@@ -23,11 +23,11 @@ class EdgePicture : public ::testing::Test {
     desc.width_px = kWidth;
     desc.height_px = kHeight;
     desc.planes[0] = reinterpret_cast<const uint8_t*>(metres.data());
-    maq_intrinsics camera{};
+    maq_intrinsics& camera = desc.intrinsics;
     camera.width_px = kWidth, camera.height_px = kHeight;
     camera.fx_px = camera.fy_px = 40;
     camera.cx_px = (kWidth - 1) / 2.0, camera.cy_px = (kHeight - 1) / 2.0;
-    result_.emplace(edges_.run(maquette::Frame(context_, desc), camera));
+    result_.emplace(edges_.run(maquette::Frame(context_, desc)));
     maquette::RgbaImage picture;
     maquette::draw_edge_layer(*result_, layer, &picture);
     EXPECT_EQ(picture.width_px, kWidth);
@@ -93,16 +93,16 @@ TEST_F(EdgePicture, TheDistanceIsRedAtAnEdgeAndDarkBlueFarFromIt) {
 }
 
 TEST_F(EdgePicture, CurvesAreConvexConcaveOrBoundaries) {
-  const auto group = [](maq_edge_kind kind, maq_edge_bend bend) {
+  const auto group = [](maq_edges_kind kind, maq_edges_convexity convexity) {
     maq_edges_curve curve{};
     curve.kind = kind;
-    curve.bend = bend;
+    curve.convexity = convexity;
     return maquette::group_of(curve);
   };
-  EXPECT_EQ(group(MAQ_EDGE_CREASE, MAQ_EDGE_BEND_CONVEX), maquette::EdgeGroup::kConvex);
-  EXPECT_EQ(group(MAQ_EDGE_CREASE, MAQ_EDGE_BEND_UNKNOWN), maquette::EdgeGroup::kConvex);
-  EXPECT_EQ(group(MAQ_EDGE_CREASE, MAQ_EDGE_BEND_CONCAVE), maquette::EdgeGroup::kConcave);
-  EXPECT_EQ(group(MAQ_EDGE_BOUNDARY, MAQ_EDGE_BEND_UNKNOWN), maquette::EdgeGroup::kBoundary);
+  EXPECT_EQ(group(MAQ_EDGES_KIND_CREASE, MAQ_EDGES_CONVEXITY_CONVEX), maquette::EdgeGroup::kConvex);
+  EXPECT_EQ(group(MAQ_EDGES_KIND_CREASE, MAQ_EDGES_CONVEXITY_UNKNOWN), maquette::EdgeGroup::kConvex);
+  EXPECT_EQ(group(MAQ_EDGES_KIND_CREASE, MAQ_EDGES_CONVEXITY_CONCAVE), maquette::EdgeGroup::kConcave);
+  EXPECT_EQ(group(MAQ_EDGES_KIND_BOUNDARY, MAQ_EDGES_CONVEXITY_UNKNOWN), maquette::EdgeGroup::kBoundary);
 }
 
 TEST_F(EdgePicture, ABoxHasItsTwelveEdgesAndEachLengthAtTheNearest) {

@@ -9,7 +9,7 @@ class EdgesFrame : public ::testing::Test {
  protected:
   maquette::PipelineResult found(const char* uri, bool finds_curves) {
     maq_edges_config edges = maquette::default_edges_config();
-    edges.bundle_path = MAQ_TEST_MODELS "/edges-int8";
+    edges.model.bundle_path = MAQ_TEST_MODELS "/edges-int8";
     const maq_edges_curves_config curves = maquette::default_edges_curves_config();
     maquette::Pipeline pipeline(context_);
     pipeline.set_model(maquette::EdgesModel(context_, edges, finds_curves ? &curves : nullptr));

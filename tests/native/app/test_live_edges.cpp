@@ -24,7 +24,7 @@ class EdgesRun {
 
   static maquette::LiveEdgesOptions shipped() {
     maquette::LiveEdgesOptions model;
-    model.edges.bundle_path = MAQ_TEST_MODELS "/edges-int8";
+    model.edges.model.bundle_path = MAQ_TEST_MODELS "/edges-int8";
     return model;
   }
   std::vector<SeenEdges> seen() const {

@@ -111,7 +111,7 @@ TEST_F(EdgesCommandLine, CurvesAreWrittenInEachFormatAndBoxesAreMeasured) {
     for (const auto& box : frame["boxes"]) {
       ++boxes;
       EXPECT_NEAR(box["size_m"][0].get<double>(), 0.441, 0.04);
-      EXPECT_GT(box["plus_minus_m"][2], 0);
+      EXPECT_GT(box["size_tolerance_m"][2], 0);
     }
   }
   EXPECT_EQ(count, 4u);
@@ -158,8 +158,20 @@ TEST_F(EdgesCommandLine, WhatHasNoDepthNoCalibrationOrNoBundleIsASentence) {
   expect_failure("'image:depth.png?depth_unit=0.001&fov=60' --out o --bundle " MAQ_TEST_DATA "/tiny_bundle",
                  "densepose");
   EXPECT_EQ(files("o"), std::set<std::string>()) << "nothing is half written";
-  const Outcome wrong = run("'image:depth.png?depth_unit=0.001&fov=60'");
-  EXPECT_EQ(wrong.exit_code, 2) << "--out is required";
+}
+
+TEST_F(EdgesCommandLine, WithoutAFolderResultsAreOnlyPrinted) {
+  const std::string source = "'image:depth.png?depth_unit=0.001&fov=60' ";
+  const auto before = files("");
+  const Outcome printed = run(source + "--boxes");
+  EXPECT_EQ(printed.exit_code, 0) << printed.err;
+  EXPECT_NE(printed.out.find("box"), std::string::npos) << printed.out;
+  EXPECT_EQ(files(""), before);
+  for (const char* needs_folder : {"--overlay", "--format step"}) {
+    const Outcome wrong = run(source + needs_folder);
+    EXPECT_EQ(wrong.exit_code, 2);
+    EXPECT_NE(wrong.err.find("--out"), std::string::npos) << wrong.err;
+  }
 }
 
 // Cut files, a head that promises more pixels than there is memory for, a focal length of 0, a file where the folder

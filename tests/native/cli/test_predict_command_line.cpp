@@ -151,7 +151,7 @@ TEST_F(PredictCommandLine, AfterTheEndThereIsNothingToCompareWith) {
 }
 
 TEST_F(PredictCommandLine, PlayConcealsAStallAndCountsWhatItMadeUp) {
-  const std::string stub = "'stub:people?size=160x120&fps=30&stall=300ms@30&live=1' --no-picture --frames 45";
+  const std::string stub = "'stub:people?size=160x120&fps=30&stall=300ms@30&live=1' --no-image --frames 45";
   const Outcome bridged = run_program(folder_, "MAQ_BUNDLE=", "play " + stub + " --conceal --json a.json");
   ASSERT_EQ(bridged.exit_code, 0) << bridged.err;
   EXPECT_NE(bridged.out.find("predicted frames"), std::string::npos) << bridged.out;

@@ -35,8 +35,8 @@ TEST(Boxes, ABoxOfTheTrueFieldIsMeasuredWithinAMillimetre) {
   EXPECT_LE(worst_error(boxes, 0.5, 0.36, 0.3), 1e-3);
   EXPECT_GE(boxes[0].corners, 6);  // of the 7 that are seen
   for (size_t k = 0; k < 3; ++k) {
-    EXPECT_GT(boxes[0].plus_minus_m[k], 0);
-    EXPECT_LT(boxes[0].plus_minus_m[k], 5e-3);
+    EXPECT_GT(boxes[0].size_tolerance_m[k], 0);
+    EXPECT_LT(boxes[0].size_tolerance_m[k], 5e-3);
     EXPECT_NEAR(maq::dot(boxes[0].axis[k], boxes[0].axis[(k + 1) % 3]), 0, 1e-6);
   }
 }

@@ -153,13 +153,13 @@ TEST(CurveExtraction, DepthOfACreaseIsNotThatOfItsSmearedPixels) {
   const SeenScene clean = seen_at(ridge(1.2));
   SeenScene smeared = clean;
   Damage by;
-  by.smear_px = 3;
+  by.flying_pixel_band_px = 3;
   damage(smeared, by, 1);
   CurveExtractor extractor;
   for (const SeenScene* seen : {&clean, const_cast<const SeenScene*>(&smeared)}) {
     const EdgeCurves& found = extractor.extract(seen->field);
     ASSERT_EQ(found.curves.size(), 1u);
-    EXPECT_EQ(found.curves[0].bend, maq::Bend::kConvex);
+    EXPECT_EQ(found.curves[0].convexity, maq::Convexity::kConvex);
     EXPECT_LE(line_errors(*seen, found).offset_r, 0.02);
   }
 }
@@ -170,9 +170,9 @@ TEST(CurveExtraction, ConvexAndConcaveFollowFromThePlanes) {
   const EdgeCurves& found = extractor.extract(seen.field);
   int convex = 0, concave = 0;
   for (const EdgeCurve& curve : found.curves) {
-    EXPECT_TRUE(curve.kind == maq::kCreaseEdge || curve.bend == maq::Bend::kUnknown);
-    convex += curve.bend == maq::Bend::kConvex;
-    concave += curve.bend == maq::Bend::kConcave;
+    EXPECT_TRUE(curve.kind == maq::kCreaseEdge || curve.convexity == maq::Convexity::kUnknown);
+    convex += curve.convexity == maq::Convexity::kConvex;
+    concave += curve.convexity == maq::Convexity::kConcave;
   }
   EXPECT_GE(convex, 6);   // three edges of either box that both sides are seen of
   EXPECT_GE(concave, 4);  // where they stand on what is below
@@ -246,7 +246,7 @@ EdgeField plain_field(int width, int height, float distance) {
   field.intrinsics = camera_of(width, height, 300);
   const size_t pixels = size_t(width) * size_t(height);
   field.distance_r.assign(pixels, distance);
-  field.spread_r.assign(pixels, 0);
+  field.expected_error_r.assign(pixels, 0);
   field.kind.assign(pixels, maq::kCreaseEdge);
   field.depth_m.assign(pixels, 1);
   return field;

@@ -22,7 +22,7 @@ EdgeCurves example() {
   EdgeCurves curves;
   curves.corners.push_back({{0.5, 0, 1}, 2});
   EdgeCurve line;
-  line.bend = maq::Bend::kConvex;
+  line.convexity = maq::Convexity::kConvex;
   line.corner = {-1, 0};
   line.has_plane[0] = true;
   line.plane[0] = {{0, 0, -1}, -1};
@@ -44,7 +44,7 @@ EdgeCurves example() {
   }
   curves.curves.push_back(arc);
   EdgeCurve spline;
-  spline.bend = maq::Bend::kConcave;
+  spline.convexity = maq::Convexity::kConcave;
   spline.type = maq::CurveType::kSpline;
   spline.first_point = 33, spline.point_count = 9;
   spline.control_count = 6;

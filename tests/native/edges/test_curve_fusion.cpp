@@ -29,7 +29,7 @@ std::pair<EdgeCurves, PinholeCamera> box_from(Vec3 eye, unsigned seed) {
   scene.seen_from(eye, target);
   SeenScene seen = see(std::move(scene), camera_of(320, 240, 300));
   Damage by;
-  by.blur_px = 0.7, by.noise_r = 0.7, by.smear_px = 2, by.depth_noise_r = 0.3;
+  by.blur_px = 0.7, by.noise_r = 0.7, by.flying_pixel_band_px = 2, by.depth_noise_r = 0.3;
   damage(seen, by, seed);
   PinholeCamera camera;
   camera.intrinsics() = seen.field.intrinsics;

@@ -65,7 +65,7 @@ TEST_F(EdgeBundles, ThatWriteTheOutputOverTheInputGiveTheSame) {
       apart->run(tiny_edges::view_of(depth, size.width, size.height), size.intrinsics(), expected);
       shared.run(tiny_edges::view_of(depth, size.width, size.height), size.intrinsics(), found);
       EXPECT_EQ(found.field.distance_r, expected.field.distance_r) << size.name();
-      EXPECT_EQ(found.field.spread_r, expected.field.spread_r);
+      EXPECT_EQ(found.field.expected_error_r, expected.field.expected_error_r);
       EXPECT_EQ(found.field.kind, expected.field.kind);
     }
   }

@@ -35,7 +35,7 @@ std::vector<float> noise(int width, int height, unsigned seed) {
 }
 
 bool is_clear(const maq::EdgeField& field, size_t at) {
-  return field.distance_r[at] == kEps_r && field.spread_r[at] == kEps_r && field.kind[at] == maq::kNoEdge;
+  return field.distance_r[at] == kEps_r && field.expected_error_r[at] == kEps_r && field.kind[at] == maq::kNoEdge;
 }
 
 TEST(Edges, TheFieldIsTheAnswerOfTorch) {
@@ -58,7 +58,7 @@ TEST(Edges, TheFieldIsTheAnswerOfTorch) {
         const float* cell = planes.data() + size_t(y / 2 * columns + x / 2) * 16 + size_t(2 * (y % 2) + x % 2);
         const float distance = std::clamp(cell[0] * kEps_r, 0.0f, kEps_r);
         ASSERT_NEAR(field.distance_r[at], distance, 1e-4) << x << " " << y;
-        ASSERT_NEAR(field.spread_r[at], kEps_r * std::exp(std::clamp(cell[4], -7.0f, 1.0f)), 1e-3);
+        ASSERT_NEAR(field.expected_error_r[at], kEps_r * std::exp(std::clamp(cell[4], -7.0f, 1.0f)), 1e-3);
         if (std::abs(cell[8] - cell[12]) < 1e-4f || std::abs(distance - kEps_r) < 1e-4f) continue;
         ASSERT_EQ(field.kind[at], distance == kEps_r ? 0 : cell[8] > cell[12] ? 1 : 2);
       }
@@ -79,7 +79,7 @@ TEST(Edges, FramesOfAnySizeTakeTurns) {
     int64_t known = 0;
     for (size_t i = 0; i < depth.size(); ++i) {
       ASSERT_TRUE(result.field.distance_r[i] >= 0 && result.field.distance_r[i] <= kEps_r);
-      ASSERT_TRUE(result.field.spread_r[i] > 0 && result.field.spread_r[i] < 3 * kEps_r);
+      ASSERT_TRUE(result.field.expected_error_r[i] > 0 && result.field.expected_error_r[i] < 3 * kEps_r);
       ASSERT_LE(result.field.kind[i], 2);
       ASSERT_EQ(result.field.depth_m[i], std::max(depth[i], 0.0f));
       known += depth[i] > 0;
@@ -132,7 +132,7 @@ TEST(Edges, HolesStayHolesAndDoNotSpread) {
   }
   const maq::EdgesResult result = run(*edges, depth, 48, 48);
   for (size_t i = 0; i < depth.size(); ++i) {
-    ASSERT_EQ(result.field.spread_r[i] == kEps_r, depth[i] == 0);
+    ASSERT_EQ(result.field.expected_error_r[i] == kEps_r, depth[i] == 0);
     ASSERT_TRUE(depth[i] > 0 || is_clear(result.field, i));
   }
 }
@@ -167,7 +167,7 @@ TEST(Edges, AFewKnownPixelsHaveAnAnswerAndNoOthers) {
     EXPECT_EQ(result.stats.broken_pixels, 0);
     for (size_t i = 0; i < depth.size(); ++i) {
       if (depth[i] > 0) {
-        ASSERT_TRUE(std::isfinite(result.field.distance_r[i]) && result.field.spread_r[i] < 3 * kEps_r);
+        ASSERT_TRUE(std::isfinite(result.field.distance_r[i]) && result.field.expected_error_r[i] < 3 * kEps_r);
       } else {
         ASSERT_TRUE(is_clear(result.field, i));
       }
@@ -188,7 +188,7 @@ TEST(Edges, TheUnitOf16BitDepthIsWithoutEffect) {
     for (float& z : scaled) z *= unit;
     const maq::EdgesResult result = run(*edges, scaled, 64, 48);
     EXPECT_EQ(result.field.distance_r, expected.field.distance_r);
-    EXPECT_EQ(result.field.spread_r, expected.field.spread_r);
+    EXPECT_EQ(result.field.expected_error_r, expected.field.expected_error_r);
     EXPECT_EQ(result.field.kind, expected.field.kind);
   }
 }
@@ -225,7 +225,7 @@ TEST(Edges, OneThreadAndTwoAndReusedMemoryGiveTheSameField) {
     for (int i = 0; i < 3; ++i) {
       two->run(view_of(depth, width, height), camera_of(width, height), reused);
       ASSERT_EQ(reused.field.distance_r, expected.field.distance_r);
-      ASSERT_EQ(reused.field.spread_r, expected.field.spread_r);
+      ASSERT_EQ(reused.field.expected_error_r, expected.field.expected_error_r);
       ASSERT_EQ(reused.field.kind, expected.field.kind);
     }
   }
@@ -258,7 +258,7 @@ TEST(Edges, WhatIsNoDepthOrNoCameraOfItIsRefused) {
   const auto refused = [&](maq_status status, const char* text, const maq::ImageView& image, maq::Intrinsics camera) {
     expect_error(status, text, [&] { edges->run(image, camera, result); });
   };
-  refused(MAQ_ERROR_UNSUPPORTED, "a picture (BGR8)", picture, camera_of(8, 6));
+  refused(MAQ_ERROR_UNSUPPORTED, "an image (BGR8)", picture, camera_of(8, 6));
   refused(MAQ_ERROR_INVALID_ARGUMENT, "camera of 6 x 8 pixels", depth, camera_of(6, 8));
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   for (const double focal_px : {0.0, -100.0, nan, infinity, 1e-9, 1e12}) {

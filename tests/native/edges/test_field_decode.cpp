@@ -25,7 +25,7 @@ EdgeField field_of(int width, int height) {
   const size_t pixels = size_t(width) * size_t(height);
   field.depth_m.assign(pixels, 1);
   field.distance_r.assign(pixels, -7);
-  field.spread_r.assign(pixels, -7);
+  field.expected_error_r.assign(pixels, -7);
   field.kind.assign(pixels, 99);
   return field;
 }
@@ -59,7 +59,7 @@ TEST(FieldDecode, DistancesAreInFootprintsAndCutOff) {
 TEST(FieldDecode, SpreadsAreExponentialsWithinTheLimitsOfTraining) {
   const EdgeField field = decoded({{0, 0, 0, 0}, {0, -3, 0, 0}, {0, -50, 0, 0}, {0, 50, 0, 0}});
   const double expected[] = {16, 16 * std::exp(-3.0), 16 * std::exp(-7.0), 16 * std::exp(1.0)};
-  for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(field.spread_r[i] / expected[i], 1, 1e-6);
+  for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(field.expected_error_r[i] / expected[i], 1, 1e-6);
 }
 
 TEST(FieldDecode, WhatANetworkMayNotSayIsNoEdgeAndCounted) {
@@ -69,7 +69,7 @@ TEST(FieldDecode, WhatANetworkMayNotSayIsNoEdgeAndCounted) {
       &broken);
   EXPECT_EQ(broken, 2);
   EXPECT_EQ(field.distance_r, (std::vector<float>{kEps_r, kEps_r, 0, kEps_r}));
-  for (const float spread : field.spread_r) EXPECT_TRUE(std::isfinite(spread) && spread > 0);
+  for (const float spread : field.expected_error_r) EXPECT_TRUE(std::isfinite(spread) && spread > 0);
   EXPECT_EQ(field.kind, (std::vector<uint8_t>{maq::kNoEdge, maq::kNoEdge, maq::kBoundaryEdge, maq::kNoEdge}));
 }
 
@@ -98,7 +98,7 @@ TEST(FieldDecode, EachPixelOfAWindowHasItsAnswerAndTheRestIsClear) {
                                  y < window.top_px + window.height_px;
           const bool has_answer = is_inside && field.depth_m[at] > 0;
           ASSERT_EQ(field.distance_r[at], has_answer ? answer(x, y) * kEps_r : kEps_r) << x << " " << y;
-          ASSERT_EQ(field.spread_r[at], kEps_r);
+          ASSERT_EQ(field.expected_error_r[at], kEps_r);
           ASSERT_EQ(field.kind[at], has_answer ? maq::kCreaseEdge : maq::kNoEdge);
         }
       }

@@ -18,9 +18,9 @@ constexpr int64_t kLongEnoughNs = 60000000000;
 
 maq_edges_config edges_config(const char* bundle = kTinyEdges) {
   maq_edges_config config = maquette::default_edges_config();
-  config.bundle_path = bundle;
-  config.threads = 1;
-  config.allow_spinning = 0;
+  config.model.bundle_path = bundle;
+  config.model.threads = 1;
+  config.model.spinning = MAQ_SPINNING_OFF;
   return config;
 }
 
@@ -59,7 +59,6 @@ TEST_F(EdgesPipeline, GivesWhatARunOfTheFrameGives) {
   maquette::Pipeline live = pipeline(true);
   live.set_source(kStub);
   maquette::Edges edges(context, edges_config());
-  maquette::Source source(context, kStub);
   int count = 0;
   while (const auto result = live.next(kLongEnoughNs)) {
     ++count;
@@ -67,7 +66,7 @@ TEST_F(EdgesPipeline, GivesWhatARunOfTheFrameGives) {
     const auto found_curves = maquette::curves_of(*result);
     ASSERT_TRUE(found_edges);
     ASSERT_TRUE(found_curves);
-    const maquette::EdgesResult expected = edges.run(result->frame, *source.intrinsics());
+    const maquette::EdgesResult expected = edges.run(result->frame);
     ASSERT_EQ(found_edges->width_px(), 96);
     EXPECT_EQ(std::memcmp(found_edges->distance_r(), expected.distance_r(), 96 * 72 * sizeof(float)), 0);
     const std::vector<maq_edges_curve> found = found_curves->curves(), wanted = expected.find_curves().curves();
@@ -119,7 +118,7 @@ TEST_F(EdgesPipeline, ASourceWithoutDepthOrCalibrationFailsWithItsSentence) {
   live.set_source("stub:pattern?size=64x48");
   EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("without depth"), std::string::npos);
   live.set_source("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
-  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("does not say how its camera"), std::string::npos);
+  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("does not carry the intrinsics"), std::string::npos);
   live.set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?fov=60");
   EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("without depth"), std::string::npos);
   live.set_source(kStub);
@@ -164,7 +163,7 @@ TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
   };
   const maquette::Context logged(of_context);
   maq_edges_config edges = edges_config();
-  edges.threads = MAQ_THREADS_MEASURED;
+  edges.model.threads = MAQ_THREADS_MEASURED;
   maquette::Pipeline live(logged);
   live.set_model(maquette::EdgesModel(logged, edges));
   live.set_source(kStub);
@@ -188,10 +187,10 @@ TEST_F(EdgesPipeline, WrongArgumentsAreRefused) {
     EXPECT_EQ(made, nullptr);
     EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
   };
-  curves.gap_r = -1;
-  refused(&edges, &curves, "gap_r is -1");
+  curves.min_votes = -1;
+  refused(&edges, &curves, "min_votes is -1");
   maq_edges_config wrong = edges;
-  wrong.threads = 99;
+  wrong.model.threads = 99;
   refused(&wrong, nullptr, "threads is 99");
   EXPECT_EQ(maq_edges_model_create(nullptr, &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_edges_model_create(context.get(), &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);

@@ -77,18 +77,18 @@ TEST_F(AndroidCameras, AreListedWithTheirSizesAndTheirProblems) {
 
 TEST_F(AndroidCameras, WhatTheyCannotDoIsASentence) {
   fake_.cameras.push_back({"2", {}});
-  expect_error(MAQ_ERROR_UNSUPPORTED, "android:2 offers no pictures for processing", [&] { camera({}, "2"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "android:2 offers no images for processing", [&] { camera({}, "2"); });
   // Metadata that cannot be is as good as none.
   auto& odd = fake_.cameras[2].metadata;
   odd.set<int32_t>(ndk::ACAMERA_SCALER_AVAILABLE_STREAM_CONFIGURATIONS,
                    {0x23, -640, 480, 0, 0x23, 0, 0, 0, 0x23, 1 << 30, 1 << 30, 0, 0x23, 640, 480});
-  expect_error(MAQ_ERROR_UNSUPPORTED, "offers no pictures", [&] { camera({}, "2"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers no images", [&] { camera({}, "2"); });
   odd.set<int64_t>(ndk::ACAMERA_SCALER_AVAILABLE_STREAM_CONFIGURATIONS, {0x23, 640, 480, 0});
-  expect_error(MAQ_ERROR_UNSUPPORTED, "offers no pictures", [&] { camera({}, "2"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers no images", [&] { camera({}, "2"); });
   odd.set<int32_t>(ndk::ACAMERA_SCALER_AVAILABLE_STREAM_CONFIGURATIONS, {0x23, 640, 480, 0});
   odd.set<uint8_t>(ndk::ACAMERA_LENS_FACING, {77});
   EXPECT_EQ(camera({"", 0, 0, 30}, "2")->format().width_px, 640);
-  expect_error(MAQ_ERROR_UNSUPPORTED, "has no", [&] { camera()->set_control(MAQ_CONTROL_EXPOSURE, 1); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "has no", [&] { camera()->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 1); });
 }
 
 TEST_F(AndroidCameras, SayWhatToDo) {

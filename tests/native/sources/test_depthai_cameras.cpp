@@ -642,58 +642,59 @@ TEST_F(DepthaiCameras, ControlsReachTheDeviceAndValuesOutOfRangeDoNot) {
   colour.exposure_us = 8000, colour.gain_iso = 250, colour.focus = 140, colour.white_balance_k = 4300;
   fake_.send_colour(std::move(colour));
   take_and_return(*opened);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).value, 8000) << "what the automatic chose";
-  EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).max, 33333) << "a frame's time";
-  EXPECT_EQ(opened->control(MAQ_CONTROL_WHITE_BALANCE).value, 4300);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 1);
-  opened->set_control(MAQ_CONTROL_EXPOSURE, 5000.4);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 0);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_EXPOSURE).value, 5000);
-  opened->set_control(MAQ_CONTROL_GAIN, 800);
-  opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 0);
-  opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 1);
-  opened->set_control(MAQ_CONTROL_FOCUS, 255);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_FOCUS).value, 0);
-  opened->set_control(MAQ_CONTROL_AUTO_FOCUS, 1);
-  opened->set_control(MAQ_CONTROL_WHITE_BALANCE, 6500);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_WHITE_BALANCE).value, 0);
-  opened->set_control(MAQ_CONTROL_AUTO_WHITE_BALANCE, 1);
-  opened->set_control(MAQ_CONTROL_BRIGHTNESS, -10);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_EXPOSURE).value, 8000) << "what the automatic chose";
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_EXPOSURE).max, 33333) << "a frame's time";
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_WHITE_BALANCE).value, 4300);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 1);
+  opened->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 5000.4);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 0);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_EXPOSURE).value, 5000);
+  opened->set_control(MAQ_SOURCE_CONTROL_GAIN, 800);
+  opened->set_control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 0);
+  opened->set_control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 1);
+  opened->set_control(MAQ_SOURCE_CONTROL_FOCUS, 255);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_FOCUS).value, 0);
+  opened->set_control(MAQ_SOURCE_CONTROL_AUTO_FOCUS, 1);
+  opened->set_control(MAQ_SOURCE_CONTROL_WHITE_BALANCE, 6500);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE).value, 0);
+  opened->set_control(MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE, 1);
+  opened->set_control(MAQ_SOURCE_CONTROL_BRIGHTNESS, -10);
   const std::vector<std::string> expected = {
       "exposure 5000 250", "exposure 5000 800",  "auto_exposure 0",      "auto_exposure 1", "focus 255",
       "auto_focus 1",      "white_balance 6500", "auto_white_balance 1", "brightness -10"};
   EXPECT_EQ(fake_.commands(), expected);
 
-  for (int which = MAQ_CONTROL_AUTO_EXPOSURE; which <= MAQ_CONTROL_BRIGHTNESS; ++which) {
-    const maq_control_info info = opened->control(maq_control(which));
+  for (int which = MAQ_SOURCE_CONTROL_AUTO_EXPOSURE; which <= MAQ_SOURCE_CONTROL_BRIGHTNESS; ++which) {
+    const maq_source_control_info info = opened->control(maq_source_control(which));
     EXPECT_TRUE(info.min < info.max && info.value >= info.min && info.value <= info.max &&
                 info.default_value >= info.min && info.default_value <= info.max && info.step == 1)
         << which;
     for (const double value : {info.min - 1, info.max + 1, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
-      expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] { opened->set_control(maq_control(which), value); });
+      expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from",
+                   [&] { opened->set_control(maq_source_control(which), value); });
     }
   }
   EXPECT_EQ(fake_.commands(), expected) << "nothing of that reached the device";
   fake_.features.has_autofocus = false;
   const auto fixed = camera();
-  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be focused", [&] { fixed->set_control(MAQ_CONTROL_FOCUS, 5); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be focused", [&] { fixed->control(MAQ_CONTROL_AUTO_FOCUS); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be focused", [&] { fixed->set_control(MAQ_SOURCE_CONTROL_FOCUS, 5); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be focused", [&] { fixed->control(MAQ_SOURCE_CONTROL_AUTO_FOCUS); });
 }
 
 TEST_F(DepthaiCameras, AControlThatFailsChangesNothing) {
   const auto opened = camera();
   for (const Fault fault : {Fault::kRuntimeError, Fault::kError, Fault::kInt}) {
     fake_.break_call(Call::kControl, fault);
-    for (int which = MAQ_CONTROL_AUTO_EXPOSURE; which <= MAQ_CONTROL_BRIGHTNESS; ++which) {
-      const maq_control_info before = opened->control(maq_control(which));
+    for (int which = MAQ_SOURCE_CONTROL_AUTO_EXPOSURE; which <= MAQ_SOURCE_CONTROL_BRIGHTNESS; ++which) {
+      const maq_source_control_info before = opened->control(maq_source_control(which));
       expect_error(fault == Fault::kError ? MAQ_ERROR_BUSY : MAQ_ERROR_DEVICE_LOST, "does not take a control",
-                   [&] { opened->set_control(maq_control(which), before.min); });
-      EXPECT_EQ(opened->control(maq_control(which)).value, before.value);
+                   [&] { opened->set_control(maq_source_control(which), before.min); });
+      EXPECT_EQ(opened->control(maq_source_control(which)).value, before.value);
     }
   }
   fake_.mend();
   opened->close();
-  expect_error(MAQ_ERROR_DEVICE_LOST, "is closed", [&] { opened->set_control(MAQ_CONTROL_BRIGHTNESS, 1); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "is closed", [&] { opened->set_control(MAQ_SOURCE_CONTROL_BRIGHTNESS, 1); });
 }
 
 }  // namespace

@@ -143,32 +143,33 @@ std::string next_setting(maq::LibcameraControls& book) {
 
 TEST(LibcameraChoices, ControlsHaveTheRangesOfTheCamera) {
   const maq::LibcameraControls book(board_controls(), "libcamera:0");
-  const maq_control_info exposure = book.get(MAQ_CONTROL_EXPOSURE);
+  const maq_source_control_info exposure = book.get(MAQ_SOURCE_CONTROL_EXPOSURE);
   EXPECT_EQ(exposure.min, 100);
   EXPECT_EQ(exposure.max, 66666);
   EXPECT_EQ(exposure.default_value, 20000);
   EXPECT_EQ(exposure.value, 20000);
   EXPECT_EQ(exposure.step, 1);
-  EXPECT_EQ(book.get(MAQ_CONTROL_BRIGHTNESS).min, -1);
-  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).max, 1) << "libcamera has three ways to focus, and we two";
-  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).value, 0);
-  expect_error(MAQ_ERROR_UNSUPPORTED, "libcamera:0 has no control 7", [&] { book.get(MAQ_CONTROL_WHITE_BALANCE); });
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_BRIGHTNESS).min, -1);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_AUTO_FOCUS).max, 1) << "libcamera has three ways to focus, and we two";
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_AUTO_FOCUS).value, 0);
+  expect_error(MAQ_ERROR_UNSUPPORTED, "libcamera:0 has no control 7",
+               [&] { book.get(MAQ_SOURCE_CONTROL_WHITE_BALANCE); });
 }
 
 TEST(LibcameraChoices, ACameraWithoutAnyControlHasNone) {
   const maq::LibcameraControls book(ControlInfoMap(), "libcamera:0");
-  expect_error(MAQ_ERROR_UNSUPPORTED, "has no control 2", [&] { book.get(MAQ_CONTROL_EXPOSURE); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "has no control 2", [&] { book.get(MAQ_SOURCE_CONTROL_EXPOSURE); });
 }
 
 TEST(LibcameraChoices, AValueSetByHandSwitchesItsAutomaticOffWithARequestBeforeIt) {
   maq::LibcameraControls book(board_controls(), "libcamera:0");
   EXPECT_EQ(next_setting(book), "");
-  book.set(MAQ_CONTROL_EXPOSURE, 12345.4);
-  EXPECT_EQ(book.get(MAQ_CONTROL_EXPOSURE).value, 12345);
-  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_EXPOSURE).value, 0);
-  book.set(MAQ_CONTROL_GAIN, 4);
-  book.set(MAQ_CONTROL_FOCUS, 2.5);
-  book.set(MAQ_CONTROL_AUTO_FOCUS, 1);
+  book.set(MAQ_SOURCE_CONTROL_EXPOSURE, 12345.4);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_EXPOSURE).value, 12345);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 0);
+  book.set(MAQ_SOURCE_CONTROL_GAIN, 4);
+  book.set(MAQ_SOURCE_CONTROL_FOCUS, 2.5);
+  book.set(MAQ_SOURCE_CONTROL_AUTO_FOCUS, 1);
   for (const char* setting : {"AeEnable=false", "ExposureTime=12345", "AeEnable=false", "AnalogueGain=4.000000",
                               "AfMode=0", "LensPosition=2.500000", "AfMode=2", ""}) {
     EXPECT_EQ(next_setting(book), setting);
@@ -177,12 +178,12 @@ TEST(LibcameraChoices, AValueSetByHandSwitchesItsAutomaticOffWithARequestBeforeI
 
 TEST(LibcameraChoices, SettingsThatNoFrameTakesAwayDoNotPileUp) {
   maq::LibcameraControls book(board_controls(), "libcamera:0");
-  for (int value = 100; value < 10000; ++value) book.set(MAQ_CONTROL_EXPOSURE, value);
+  for (int value = 100; value < 10000; ++value) book.set(MAQ_SOURCE_CONTROL_EXPOSURE, value);
   for (const char* setting : {"AeEnable=false", "ExposureTime=9999", ""}) EXPECT_EQ(next_setting(book), setting);
   expect_error(MAQ_ERROR_BUSY, "settings waiting for its next frames", [&] {
     for (int i = 0; i < 100; ++i) {
-      book.set(MAQ_CONTROL_EXPOSURE, 1000 + i);
-      book.set(MAQ_CONTROL_BRIGHTNESS, 0.5);
+      book.set(MAQ_SOURCE_CONTROL_EXPOSURE, 1000 + i);
+      book.set(MAQ_SOURCE_CONTROL_BRIGHTNESS, 0.5);
     }
   });
 }
@@ -191,7 +192,7 @@ TEST(LibcameraChoices, ValuesOutOfRangeAreRefusedAndSetNothing) {
   maq::LibcameraControls book(board_controls(), "libcamera:0");
   for (const double value : {99.0, 66667.0, -1.0, std::nan("")}) {
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Control 2 of libcamera:0 goes from 100 to 66666, not to",
-                 [&] { book.set(MAQ_CONTROL_EXPOSURE, value); });
+                 [&] { book.set(MAQ_SOURCE_CONTROL_EXPOSURE, value); });
   }
   EXPECT_EQ(next_setting(book), "");
 }
@@ -202,11 +203,11 @@ TEST(LibcameraChoices, FramesSayWhatTheControlsAreUnlessSomethingIsOnItsWay) {
   reported.set(controls::ExposureTime, 5000);
   reported.set(controls::AfMode, int32_t(controls::AfModeContinuous));
   book.note(reported);
-  EXPECT_EQ(book.get(MAQ_CONTROL_EXPOSURE).value, 5000);
-  EXPECT_EQ(book.get(MAQ_CONTROL_AUTO_FOCUS).value, 1);
-  book.set(MAQ_CONTROL_EXPOSURE, 700);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_EXPOSURE).value, 5000);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_AUTO_FOCUS).value, 1);
+  book.set(MAQ_SOURCE_CONTROL_EXPOSURE, 700);
   book.note(reported);
-  EXPECT_EQ(book.get(MAQ_CONTROL_EXPOSURE).value, 700);
+  EXPECT_EQ(book.get(MAQ_SOURCE_CONTROL_EXPOSURE).value, 700);
 }
 
 TEST(LibcameraChoices, TheRateIsTheNearestThatTheCameraCan) {

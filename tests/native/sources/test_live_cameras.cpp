@@ -121,7 +121,7 @@ TEST_F(LiveCameras, DepthComesWhereItIsAskedFor) {
   EXPECT_GE(frame.lease.dma_buf(), 0) << "in the device's own memory";
   EXPECT_EQ(maq::depth_of(frame), &frame.image);
   fake_.modes = {{V4L2_PIX_FMT_Z16, 64, 48, 30}};
-  expect_error(MAQ_ERROR_UNSUPPORTED, "offers Z16, but none of them is a picture; open depth with format=Z16",
+  expect_error(MAQ_ERROR_UNSUPPORTED, "offers Z16, but all of them are depth; open depth with format=Z16",
                [&] { camera(); });
   const std::vector<maq::CameraListing> listed = maq::list_v4l2_cameras(fake_);
   ASSERT_EQ(listed.size(), 1u);

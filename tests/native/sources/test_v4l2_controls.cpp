@@ -32,45 +32,48 @@ class V4l2Controls : public LiveCameraTest {
 
 TEST_F(V4l2Controls, AreReadInUnitsOfTheApi) {
   const auto opened = camera();
-  const std::tuple<maq_control, double, double, double, double> expected[] = {
-      {MAQ_CONTROL_AUTO_EXPOSURE, 0, 1, 1, 1},
-      {MAQ_CONTROL_EXPOSURE, 300, 204700, 100, 25000},
-      {MAQ_CONTROL_GAIN, 0, 100, 1, 10},
-      {MAQ_CONTROL_AUTO_FOCUS, 0, 1, 1, 1},
-      {MAQ_CONTROL_FOCUS, 1, 254, 5, 51},
-      {MAQ_CONTROL_AUTO_WHITE_BALANCE, 0, 1, 1, 1},
-      {MAQ_CONTROL_WHITE_BALANCE, 2800, 6500, 10, 4600},
-      {MAQ_CONTROL_BRIGHTNESS, -64, 64, 1, 0},
+  const std::tuple<maq_source_control, double, double, double, double> expected[] = {
+      {MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 0, 1, 1, 1},
+      {MAQ_SOURCE_CONTROL_EXPOSURE, 300, 204700, 100, 25000},
+      {MAQ_SOURCE_CONTROL_GAIN, 0, 100, 1, 10},
+      {MAQ_SOURCE_CONTROL_AUTO_FOCUS, 0, 1, 1, 1},
+      {MAQ_SOURCE_CONTROL_FOCUS, 1, 254, 5, 51},
+      {MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE, 0, 1, 1, 1},
+      {MAQ_SOURCE_CONTROL_WHITE_BALANCE, 2800, 6500, 10, 4600},
+      {MAQ_SOURCE_CONTROL_BRIGHTNESS, -64, 64, 1, 0},
   };
   control(V4L2_CID_BRIGHTNESS).value = 33;
   for (const auto& [which, least, most, step, preset] : expected) {
-    const maq_control_info info = opened->control(which);
+    const maq_source_control_info info = opened->control(which);
     EXPECT_EQ(info.min, least) << which;
     EXPECT_EQ(info.max, most) << which;
     EXPECT_EQ(info.step, step) << which;
     EXPECT_EQ(info.default_value, preset) << which;
-    EXPECT_EQ(info.value, which == MAQ_CONTROL_BRIGHTNESS ? 33 : preset) << which;
+    EXPECT_EQ(info.value, which == MAQ_SOURCE_CONTROL_BRIGHTNESS ? 33 : preset) << which;
   }
 }
 
 TEST_F(V4l2Controls, AreRoundedToStepsAndSwitchTheirAutomaticOff) {
   fake_.controls.all[V4L2_CID_AUTOGAIN] = {0, 1, 1, 1};
   const struct {
-    maq_control which;
+    maq_source_control which;
     double value;
     uint32_t id;
     int expected;
     uint32_t automatic_id;
     int off;
   } table[] = {
-      {MAQ_CONTROL_EXPOSURE, 10000, V4L2_CID_EXPOSURE_ABSOLUTE, 100, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
-      {MAQ_CONTROL_EXPOSURE, 149.9 + 300, V4L2_CID_EXPOSURE_ABSOLUTE, 4, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
-      {MAQ_CONTROL_GAIN, 5, V4L2_CID_GAIN, 5, V4L2_CID_AUTOGAIN, 0},
-      {MAQ_CONTROL_FOCUS, 8.6, V4L2_CID_FOCUS_ABSOLUTE, 11, V4L2_CID_FOCUS_AUTO, 0},
+      {MAQ_SOURCE_CONTROL_EXPOSURE, 10000, V4L2_CID_EXPOSURE_ABSOLUTE, 100, V4L2_CID_EXPOSURE_AUTO,
+       V4L2_EXPOSURE_MANUAL},
+      {MAQ_SOURCE_CONTROL_EXPOSURE, 149.9 + 300, V4L2_CID_EXPOSURE_ABSOLUTE, 4, V4L2_CID_EXPOSURE_AUTO,
+       V4L2_EXPOSURE_MANUAL},
+      {MAQ_SOURCE_CONTROL_GAIN, 5, V4L2_CID_GAIN, 5, V4L2_CID_AUTOGAIN, 0},
+      {MAQ_SOURCE_CONTROL_FOCUS, 8.6, V4L2_CID_FOCUS_ABSOLUTE, 11, V4L2_CID_FOCUS_AUTO, 0},
       // The nearest step, 256, is too far.
-      {MAQ_CONTROL_FOCUS, 254, V4L2_CID_FOCUS_ABSOLUTE, 251, V4L2_CID_FOCUS_AUTO, 0},
-      {MAQ_CONTROL_WHITE_BALANCE, 3004, V4L2_CID_WHITE_BALANCE_TEMPERATURE, 3000, V4L2_CID_AUTO_WHITE_BALANCE, 0},
-      {MAQ_CONTROL_BRIGHTNESS, -64, V4L2_CID_BRIGHTNESS, -64, 0, 0},
+      {MAQ_SOURCE_CONTROL_FOCUS, 254, V4L2_CID_FOCUS_ABSOLUTE, 251, V4L2_CID_FOCUS_AUTO, 0},
+      {MAQ_SOURCE_CONTROL_WHITE_BALANCE, 3004, V4L2_CID_WHITE_BALANCE_TEMPERATURE, 3000, V4L2_CID_AUTO_WHITE_BALANCE,
+       0},
+      {MAQ_SOURCE_CONTROL_BRIGHTNESS, -64, V4L2_CID_BRIGHTNESS, -64, 0, 0},
   };
   const auto opened = camera();
   for (const auto& row : table) {
@@ -80,7 +83,8 @@ TEST_F(V4l2Controls, AreRoundedToStepsAndSwitchTheirAutomaticOff) {
     if (row.automatic_id != 0) {
       EXPECT_EQ(fake_.control(row.automatic_id), row.off) << row.which;
     }
-    EXPECT_EQ(opened->control(row.which).value, row.which == MAQ_CONTROL_EXPOSURE ? row.expected * 100 : row.expected);
+    EXPECT_EQ(opened->control(row.which).value,
+              row.which == MAQ_SOURCE_CONTROL_EXPOSURE ? row.expected * 100 : row.expected);
   }
 }
 
@@ -89,44 +93,45 @@ TEST_F(V4l2Controls, AutomaticExposureIsWhicheverTheDriverOffers) {
   for (const uint32_t on : {V4L2_EXPOSURE_APERTURE_PRIORITY, V4L2_EXPOSURE_AUTO}) {
     for (const uint32_t off : {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}) {
       control(V4L2_CID_EXPOSURE_AUTO).items = {on, off};
-      opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 1);
+      opened->set_control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 1);
       EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_AUTO), int(on));
-      EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 1);
-      opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 0);
+      EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 1);
+      opened->set_control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 0);
       EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_AUTO), int(off));
-      EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 0);
+      EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 0);
     }
   }
   control(V4L2_CID_EXPOSURE_AUTO).items = {V4L2_EXPOSURE_MANUAL};
-  EXPECT_EQ(opened->control(MAQ_CONTROL_AUTO_EXPOSURE).max, 0);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).max, 0);
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from 0 to 0, not to 1",
-               [&] { opened->set_control(MAQ_CONTROL_AUTO_EXPOSURE, 1); });
+               [&] { opened->set_control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, 1); });
   control(V4L2_CID_EXPOSURE_AUTO).items = {};
-  expect_error(MAQ_ERROR_UNSUPPORTED, "has no automatic exposure", [&] { opened->control(MAQ_CONTROL_AUTO_EXPOSURE); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "has no automatic exposure",
+               [&] { opened->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE); });
 }
 
 TEST_F(V4l2Controls, ThatAreNotThereOrOutOfRangeAreRefusedWithTheRange) {
   const auto opened = camera();
   for (const double value : {299.0, 204701.0, -1.0, 1e300, double(NAN), double(INFINITY)}) {
     expect_error(MAQ_ERROR_INVALID_ARGUMENT, "The exposure of /dev/video0 goes from 300 to 204700 microseconds, not to",
-                 [&] { opened->set_control(MAQ_CONTROL_EXPOSURE, value); });
+                 [&] { opened->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, value); });
   }
   EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_APERTURE_PRIORITY) << "nothing was changed";
   control(V4L2_CID_GAIN).flags = V4L2_CTRL_FLAG_DISABLED;
   fake_.controls.all.erase(V4L2_CID_FOCUS_ABSOLUTE);
-  for (const maq_control which : {MAQ_CONTROL_GAIN, MAQ_CONTROL_FOCUS}) {
+  for (const maq_source_control which : {MAQ_SOURCE_CONTROL_GAIN, MAQ_SOURCE_CONTROL_FOCUS}) {
     expect_error(MAQ_ERROR_UNSUPPORTED, "/dev/video0 has no ", [&] { opened->set_control(which, 5); });
     expect_error(MAQ_ERROR_UNSUPPORTED, "/dev/video0 has no ", [&] { opened->control(which); });
   }
   control(V4L2_CID_BRIGHTNESS).flags = V4L2_CTRL_FLAG_READ_ONLY;
-  expect_error(MAQ_ERROR_BUSY, "read only", [&] { opened->set_control(MAQ_CONTROL_BRIGHTNESS, 5); });
-  EXPECT_EQ(opened->control(MAQ_CONTROL_BRIGHTNESS).value, 0);
+  expect_error(MAQ_ERROR_BUSY, "read only", [&] { opened->set_control(MAQ_SOURCE_CONTROL_BRIGHTNESS, 5); });
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_BRIGHTNESS).value, 0);
 }
 
 TEST_F(V4l2Controls, WhoseAutomaticIsOffAlreadyDoNotNeedToSwitchIt) {
   control(V4L2_CID_FOCUS_AUTO).value = 0;
   control(V4L2_CID_FOCUS_AUTO).flags = V4L2_CTRL_FLAG_READ_ONLY;
-  camera()->set_control(MAQ_CONTROL_FOCUS, 11);
+  camera()->set_control(MAQ_SOURCE_CONTROL_FOCUS, 11);
   EXPECT_EQ(fake_.control(V4L2_CID_FOCUS_ABSOLUTE), 11);
 }
 
@@ -135,25 +140,25 @@ TEST_F(V4l2Controls, OfADriverThatAnswersNonsenseAreCheckedFirst) {
   auto& gain = control(V4L2_CID_GAIN);
   gain = {100, 5, 1, 10};
   expect_error(MAQ_ERROR_UNSUPPORTED, "goes from 100 to 5, which cannot be",
-               [&] { opened->control(MAQ_CONTROL_GAIN); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be", [&] { opened->set_control(MAQ_CONTROL_GAIN, 50); });
+               [&] { opened->control(MAQ_SOURCE_CONTROL_GAIN); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "cannot be", [&] { opened->set_control(MAQ_SOURCE_CONTROL_GAIN, 50); });
   for (const int step : {0, -7, INT_MIN}) {
     gain = {0, 100, step, 10};
-    EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).step, 1);
-    opened->set_control(MAQ_CONTROL_GAIN, 42.4);
+    EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_GAIN).step, 1);
+    opened->set_control(MAQ_SOURCE_CONTROL_GAIN, 42.4);
     EXPECT_EQ(fake_.control(V4L2_CID_GAIN), 42);
   }
   gain = {0, 100, INT_MAX, 1000};
   gain.value = -1000;
-  EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).default_value, 100);
-  EXPECT_EQ(opened->control(MAQ_CONTROL_GAIN).value, 0);
-  opened->set_control(MAQ_CONTROL_GAIN, 100);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_GAIN).default_value, 100);
+  EXPECT_EQ(opened->control(MAQ_SOURCE_CONTROL_GAIN).value, 0);
+  opened->set_control(MAQ_SOURCE_CONTROL_GAIN, 100);
   EXPECT_EQ(fake_.control(V4L2_CID_GAIN), 0) << "the nearest step that is in the range";
   auto& exposure = control(V4L2_CID_EXPOSURE_ABSOLUTE);
   exposure = {INT_MIN, INT_MAX, 1, 0};
-  opened->set_control(MAQ_CONTROL_EXPOSURE, 100.0 * INT_MAX);
+  opened->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 100.0 * INT_MAX);
   EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_ABSOLUTE), INT_MAX);
-  opened->set_control(MAQ_CONTROL_EXPOSURE, 100.0 * INT_MIN);
+  opened->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 100.0 * INT_MIN);
   EXPECT_EQ(fake_.control(V4L2_CID_EXPOSURE_ABSOLUTE), INT_MIN);
 }
 
@@ -195,10 +200,11 @@ TEST_F(V4l2Controls, EveryFailureIsNamedAndLeavesTheStreamAlone) {
     for (const auto& [error, status] : errors) {
       SCOPED_TRACE(std::string(name) + " " + std::strerror(error));
       fake_.break_call(call, error);
-      expect_error(status, "/dev/video0 ", [&] { live->set_control(MAQ_CONTROL_EXPOSURE, 20000); });
-      if (call != VIDIOC_S_CTRL) expect_error(status, "/dev/video0 ", [&] { live->control(MAQ_CONTROL_EXPOSURE); });
+      expect_error(status, "/dev/video0 ", [&] { live->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 20000); });
+      if (call != VIDIOC_S_CTRL)
+        expect_error(status, "/dev/video0 ", [&] { live->control(MAQ_SOURCE_CONTROL_EXPOSURE); });
       fake_.break_call(call, EINTR, 0, 3);
-      live->set_control(MAQ_CONTROL_EXPOSURE, 20000);
+      live->set_control(MAQ_SOURCE_CONTROL_EXPOSURE, 20000);
       fake_.mend();
     }
   }
@@ -208,19 +214,20 @@ TEST_F(V4l2Controls, EveryFailureIsNamedAndLeavesTheStreamAlone) {
 }
 
 TEST_F(V4l2Controls, WhatWasSetIsSetAgainWhenTheCameraIsBack) {
-  const auto live = source(settings(), {}, {{MAQ_CONTROL_BRIGHTNESS, 20}, {MAQ_CONTROL_EXPOSURE, 10000}});
+  const auto live = source(settings(), {}, {{MAQ_SOURCE_CONTROL_BRIGHTNESS, 20}, {MAQ_SOURCE_CONTROL_EXPOSURE, 10000}});
   EXPECT_EQ(fake_.control(V4L2_CID_BRIGHTNESS), 20);
-  EXPECT_EQ(live->control(MAQ_CONTROL_AUTO_EXPOSURE).value, 0);
-  live->set_control(MAQ_CONTROL_BRIGHTNESS, 30);
-  live->set_control(MAQ_CONTROL_FOCUS, 11);
-  live->set_control(MAQ_CONTROL_AUTO_FOCUS, 1);  // later than the focus, and so later again
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] { live->set_control(MAQ_CONTROL_GAIN, 1000); });
+  EXPECT_EQ(live->control(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE).value, 0);
+  live->set_control(MAQ_SOURCE_CONTROL_BRIGHTNESS, 30);
+  live->set_control(MAQ_SOURCE_CONTROL_FOCUS, 11);
+  live->set_control(MAQ_SOURCE_CONTROL_AUTO_FOCUS, 1);  // later than the focus, and so later again
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] { live->set_control(MAQ_SOURCE_CONTROL_GAIN, 1000); });
   ASSERT_TRUE(fake_.deliver(1));
   const maq::Frame held = next(*live);  // keeps the camera of before
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
-  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment", [&] { live->control(MAQ_CONTROL_GAIN); });
-  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment", [&] { live->set_control(MAQ_CONTROL_GAIN, 5); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment", [&] { live->control(MAQ_SOURCE_CONTROL_GAIN); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "not connected at the moment",
+               [&] { live->set_control(MAQ_SOURCE_CONTROL_GAIN, 5); });
   fake_.reset_controls();
   fake_.plug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTED));
@@ -230,7 +237,7 @@ TEST_F(V4l2Controls, WhatWasSetIsSetAgainWhenTheCameraIsBack) {
   EXPECT_EQ(fake_.control(V4L2_CID_FOCUS_ABSOLUTE), 11);
   EXPECT_EQ(fake_.control(V4L2_CID_FOCUS_AUTO), 1);
   EXPECT_EQ(fake_.control(V4L2_CID_GAIN), 10);
-  EXPECT_EQ(live->control(MAQ_CONTROL_BRIGHTNESS).value, 30);
+  EXPECT_EQ(live->control(MAQ_SOURCE_CONTROL_BRIGHTNESS).value, 30);
 }
 
 TEST_F(V4l2Controls, WhatCannotBeSetAgainIsLoggedAndTheCameraIsBack) {
@@ -244,7 +251,7 @@ TEST_F(V4l2Controls, WhatCannotBeSetAgainIsLoggedAndTheCameraIsBack) {
         log += std::string(text) + "\n";
       },
       nullptr);
-  const auto live = source(logging, {}, {{MAQ_CONTROL_BRIGHTNESS, 20}, {MAQ_CONTROL_GAIN, 20}});
+  const auto live = source(logging, {}, {{MAQ_SOURCE_CONTROL_BRIGHTNESS, 20}, {MAQ_SOURCE_CONTROL_GAIN, 20}});
   fake_.unplug();
   ASSERT_TRUE(reports_.wait_for(MAQ_SOURCE_RECONNECTING));
   fake_.controls.all.erase(V4L2_CID_BRIGHTNESS);
@@ -257,7 +264,9 @@ TEST_F(V4l2Controls, WhatCannotBeSetAgainIsLoggedAndTheCameraIsBack) {
 }
 
 TEST_F(V4l2Controls, ThatCannotBeSetWhenASourceOpensAreItsErrorAndLeaveNothingOpen) {
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] { source(settings(), {}, {{MAQ_CONTROL_GAIN, 1000}}); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "goes from", [&] {
+    source(settings(), {}, {{MAQ_SOURCE_CONTROL_GAIN, 1000}});
+  });
   expect_nothing_left();
 }
 
@@ -268,7 +277,7 @@ TEST_F(V4l2Controls, OfACameraThatStaysAwayAreLostWithIt) {
   fake_.unplug();
   maq::Frame frame;
   expect_error(MAQ_ERROR_DEVICE_LOST, "did not come back", [&] { live->next(kLimit, frame); });
-  expect_error(MAQ_ERROR_DEVICE_LOST, "did not come back", [&] { live->control(MAQ_CONTROL_GAIN); });
+  expect_error(MAQ_ERROR_DEVICE_LOST, "did not come back", [&] { live->control(MAQ_SOURCE_CONTROL_GAIN); });
 }
 
 // A device that takes its time for each control.
@@ -292,7 +301,7 @@ TEST_F(V4l2Controls, ThatTakeLongDelayNeitherFramesNorReconnecting) {
                                                 "/dev/video0", settings());
   std::unique_lock<std::mutex> hang(device.hang);
   std::thread other(
-      [&] { expect_error(MAQ_ERROR_DEVICE_LOST, "", [&] { live->set_control(MAQ_CONTROL_BRIGHTNESS, 20); }); });
+      [&] { expect_error(MAQ_ERROR_DEVICE_LOST, "", [&] { live->set_control(MAQ_SOURCE_CONTROL_BRIGHTNESS, 20); }); });
   while (!device.is_asked) std::this_thread::sleep_for(1ms);
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(device.deliver(1));
@@ -316,8 +325,8 @@ TEST_F(V4l2Controls, AreSetByManyThreadsWhileTheCameraComesAndGoes) {
     threads.emplace_back([&, k] {
       for (int i = 0; !done; ++i) {
         try {
-          live->set_control(k == 0 ? MAQ_CONTROL_GAIN : MAQ_CONTROL_BRIGHTNESS, i % 60);
-          EXPECT_GE(live->control(MAQ_CONTROL_GAIN).value, 0);
+          live->set_control(k == 0 ? MAQ_SOURCE_CONTROL_GAIN : MAQ_SOURCE_CONTROL_BRIGHTNESS, i % 60);
+          EXPECT_GE(live->control(MAQ_SOURCE_CONTROL_GAIN).value, 0);
         } catch (const maq::Error& error) {
           EXPECT_EQ(error.status(), MAQ_ERROR_DEVICE_LOST) << error.what();
         }

@@ -78,7 +78,7 @@ TEST_F(V4l2Faults, SayWhatToDo) {
   }
   fake_.mend();
   fake_.capabilities = V4L2_CAP_STREAMING | V4L2_CAP_VIDEO_OUTPUT;
-  expect_error(MAQ_ERROR_UNSUPPORTED, "captures no pictures", [&] { camera(); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "captures no images", [&] { camera(); });
   fake_.capabilities = V4L2_CAP_VIDEO_CAPTURE;
   expect_error(MAQ_ERROR_UNSUPPORTED, "cannot stream", [&] { camera(); });
   fake_.capabilities |= V4L2_CAP_STREAMING;

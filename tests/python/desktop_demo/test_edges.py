@@ -120,7 +120,7 @@ def test_a_box_has_its_three_lengths(shown):
     boxes = picture.report["edges"]["boxes"]
     assert len(boxes) == 1
     assert boxes[0]["size_m"] == pytest.approx(BOX["size_m"], abs=0.02)
-    assert min(boxes[0]["plus_minus_m"]) > 0
+    assert min(boxes[0]["size_tolerance_m"]) > 0
     without = shown("--no-boxes", source=BOX["source"], frames=1)
     assert without.report["edges"]["boxes"] == []
     assert near(picture, BOX_LINE).sum() > 300

@@ -71,7 +71,8 @@ def test_names_and_surface_of_the_parts(densepose):
 
 def test_a_box_is_measured_saved_and_snapped_to(box, tmp_path):
     depth, intrinsics = box
-    result = maquette.Edges(threads=1).run(depth, intrinsics, curves=True)
+    assert depth.intrinsics == intrinsics
+    result = maquette.Edges(threads=1).run(depth, curves=True)
 
     assert result.distance_r.shape == (240, 320)
     assert result.eps_r == 16
@@ -103,6 +104,12 @@ def test_depth_in_metres_and_in_millimetres_are_one_scene(box):
     assert maquette.Frame(np.round(metres * 1000).astype(np.uint16)).depth() == pytest.approx(metres, abs=5.1e-4)
     assert np.abs(of_metres.distance_r - of_millimetres.distance_r)[metres > 0].mean() < 1
     assert of_metres.curves is None
+    wrapped = edges.run(maquette.Frame(metres, intrinsics=intrinsics))
+    assert np.array_equal(wrapped.distance_r, of_metres.distance_r)
+    with pytest.raises(maquette.MaquetteError, match="intrinsics"):
+        edges.run(metres)
+    with pytest.raises(ValueError, match="own intrinsics"):
+        edges.run(depth, maquette.Intrinsics.centred(320, 240, fov_deg=30))
 
 
 def test_views_are_fused(box):
@@ -128,21 +135,21 @@ def test_views_are_fused(box):
     with pytest.raises(ZeroDivisionError):
         failing.finish()
     with pytest.raises(maquette.MaquetteError, match="min_views"):
-        maquette.EdgesFusion(maquette.Edges(threads=1), min_views=0)
+        maquette.EdgesFusion(maquette.Edges(threads=1), min_views=-1)
 
 
 def test_many_results_and_curves_are_freed(box, densepose, person):
-    depth, intrinsics = box
+    depth, _ = box
     edges = maquette.Edges(threads=1)
     for _ in range(20):  # more than a pool holds
-        assert edges.run(depth, intrinsics, curves=True).curves.curves
+        assert edges.run(depth, curves=True).curves.curves
         densepose.run(person)
-    kept = [edges.run(depth, intrinsics, curves=True) for _ in range(16)]
+    kept = [edges.run(depth, curves=True) for _ in range(16)]
     with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_POOL_EMPTY"):
-        edges.run(depth, intrinsics, curves=True)
+        edges.run(depth, curves=True)
     kept.clear()
     gc.collect()
-    assert edges.run(depth, intrinsics, curves=True).curves.curves
+    assert edges.run(depth, curves=True).curves.curves
 
 
 def test_sources_end_and_close():
@@ -215,9 +222,9 @@ def test_what_is_wrong_is_said(call, error, text):
 
 
 def test_what_is_closed_is_said_and_nothing_reaches_the_library(densepose, person, box):
-    depth, intrinsics = box
+    depth, _ = box
     with maquette.Edges(threads=1) as edges:
-        curves = edges.run(depth, intrinsics, curves=True).curves
+        curves = edges.run(depth, curves=True).curves
     other = maquette.DensePose(threads=1)
     frame = maquette.Frame(person.pixels())
     fusion = maquette.EdgesFusion(maquette.Edges(threads=1))
@@ -225,7 +232,7 @@ def test_what_is_closed_is_said_and_nothing_reaches_the_library(densepose, perso
         closed.close()
         closed.close()
     calls = (
-        lambda: edges.run(depth, intrinsics), lambda: other.run(person), lambda: other.reset(), lambda: frame.pixels(),
+        lambda: edges.run(depth), lambda: other.run(person), lambda: other.reset(), lambda: frame.pixels(),
         lambda: densepose.run(frame), lambda: fusion.finish(), lambda: curves.snap(0, 0),
     )  # fmt: skip
     for call in calls:
@@ -236,7 +243,7 @@ def test_what_is_closed_is_said_and_nothing_reaches_the_library(densepose, perso
 
 def test_depth_is_wanted_for_edges(person):
     with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_UNSUPPORTED"):
-        maquette.Edges(threads=1).run(person, maquette.Intrinsics.centred(320, 240, fov_deg=60))
+        maquette.Edges(threads=1).run(person)
 
 
 def _small_capture(folder):

@@ -21,7 +21,7 @@ import maquette
 import maquette.native
 result = maquette.DensePose(threads=1).run(maquette.Source("stub:people?count=1&size=320x240").read())
 source = maquette.Source("stub:solids?scene=box&size=320x240")
-edges = maquette.Edges(threads=1).run(source.read(), source.intrinsics, curves=True)
+edges = maquette.Edges(threads=1).run(source.read(), curves=True)
 heads = maquette.HeadBuilder(threads=1).stats["threads"]
 print(maquette.library_path(), len(result.people), len(edges.curves.curves) > 0, heads)
 print("maquette._generated" in sys.modules)

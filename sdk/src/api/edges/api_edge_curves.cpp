@@ -11,35 +11,24 @@ namespace {
 
 constexpr double kMaxRadiusPx = 1e6;
 
-// Points are handed out as triples of doubles.
+// The app reads points as triples of doubles.
 static_assert(sizeof(Vec3) == 3 * sizeof(double));
-// Enums of both have the same values.
+// The enums of the engine and of the C API have the same values.
 static_assert(int(CurveType::kSpline) == MAQ_EDGES_CURVE_SPLINE && int(CurveType::kArc) == MAQ_EDGES_CURVE_ARC);
-static_assert(int(Bend::kConvex) == MAQ_EDGE_BEND_CONVEX && int(Bend::kConcave) == MAQ_EDGE_BEND_CONCAVE);
+static_assert(int(Convexity::kConvex) == MAQ_EDGES_CONVEXITY_CONVEX &&
+              int(Convexity::kConcave) == MAQ_EDGES_CONVEXITY_CONCAVE);
 static_assert(int(SnapTarget::kCorner) == MAQ_EDGES_SNAP_CORNER && int(SnapTarget::kEdge) == MAQ_EDGES_SNAP_CURVE &&
               int(SnapTarget::kPlane) == MAQ_EDGES_SNAP_PLANE);
 
 maq_edges_curves_config default_curves_config() {
-  const CurveOptions options;
   maq_edges_curves_config config{};
   config.struct_size = sizeof config;
-  config.select_px = options.select_px;
-  config.min_votes = options.min_votes;
-  config.smear_px = options.smear_px;
-  config.support_px = options.support_px;
-  config.break_deg = options.break_deg;
-  config.min_length_px = options.min_length_px;
-  config.tolerance_r = options.tolerance_r;
-  config.gap_r = options.gap_r;
-  config.join_px = options.join_px;
-  config.max_curves = options.max_curves;
-  config.find_boxes = 1;
   return config;
 }
 
 void write_vector(Vec3 from, double* to) { to[0] = from.x, to[1] = from.y, to[2] = from.z; }
 
-// NULL where there are none.
+// Returns NULL if `count` is 0.
 const double* doubles_of(const std::vector<Vec3>& points, int first, int count) {
   return count > 0 ? &points[size_t(first)].x : nullptr;
 }
@@ -48,7 +37,7 @@ void write_snap(const Snap& from, maq_edges_snap* snap) {
   maq_edges_snap filled{};
   filled.target = maq_edges_snap_target(from.target);
   filled.index = from.index;
-  filled.side = from.side;
+  filled.adjacent_plane_index = from.side;
   write_vector(from.point, filled.point_m);
   filled.distance_px = from.distance_px;
   filled.angle_rad = from.angle_rad;
@@ -68,11 +57,16 @@ Vec3 read_vector(const double* from, const char* name) {
 
 CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char* name) {
   const maq_edges_curves_config config = read_config(given, name, default_curves_config());
-  require_range(concatenate(name, ".find_boxes"), config.find_boxes, 0, 1);
+  require_range(concatenate(name, ".skip_boxes"), config.skip_boxes, 0, 1);
   CurveRequest request;
-  request.finds_boxes = config.find_boxes == 1;
-  request.options = {config.select_px,     config.min_votes,   config.smear_px, config.support_px, config.break_deg,
-                     config.min_length_px, config.tolerance_r, config.gap_r,    config.join_px,    config.max_curves};
+  request.finds_boxes = config.skip_boxes == 0;
+  const auto set = [](float& option, float value) { option = value == 0 ? option : value; };
+  set(request.options.vote_radius_px, config.vote_radius_px);
+  set(request.options.min_votes, config.min_votes);
+  set(request.options.flying_pixel_band_px, config.flying_pixel_band_px);
+  set(request.options.fit_band_px, config.fit_band_px);
+  set(request.options.split_angle_deg, config.split_angle_deg);
+  set(request.options.min_length_px, config.min_length_px);
   (void)CurveExtractor(request.options);  // checks them
   return request;
 }
@@ -118,11 +112,11 @@ maq_status maq_edges_curves_get_curve(const maq_edges_curves* curves, uint32_t i
     const EdgeCurve& from = all.curves[index];
     maq_edges_curve filled{};
     filled.type = maq_edges_curve_type(from.type);
-    filled.kind = maq_edge_kind(from.kind);
-    filled.bend = maq_edge_bend(from.bend);
+    filled.kind = maq_edges_kind(from.kind);
+    filled.convexity = maq_edges_convexity(from.convexity);
     filled.is_closed = from.is_closed ? 1 : 0;
     filled.length_m = from.length_m;
-    filled.rms_r = from.rms_r;
+    filled.rms_footprints = from.rms_footprints;
     filled.points_m = doubles_of(all.points, from.first_point, from.point_count);
     filled.point_count = uint32_t(from.point_count);
     filled.controls_m = doubles_of(all.controls, from.first_control, from.control_count);
@@ -136,9 +130,9 @@ maq_status maq_edges_curves_get_curve(const maq_edges_curves* curves, uint32_t i
     for (size_t i = 0; i < 2; ++i) {
       filled.corners[i] = from.corner[i];
       if (!from.has_plane[i]) continue;
-      filled.sides[i].is_known = 1;
-      write_vector(from.plane[i].normal, filled.sides[i].normal);
-      filled.sides[i].offset_m = from.plane[i].offset_m;
+      filled.adjacent_planes[i].is_known = 1;
+      write_vector(from.plane[i].normal, filled.adjacent_planes[i].normal);
+      filled.adjacent_planes[i].offset_m = from.plane[i].offset_m;
     }
     write_struct(curve, "curve", filled);
     return MAQ_OK;
@@ -168,7 +162,7 @@ maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint32_t ind
     write_vector(from.centre, filled.centre_m);
     for (size_t i = 0; i < 3; ++i) {
       filled.size_m[i] = from.size_m[i];
-      filled.plus_minus_m[i] = from.plus_minus_m[i];
+      filled.size_tolerance_m[i] = from.size_tolerance_m[i];
       write_vector(from.axis[i], filled.axes[i]);
     }
     write_struct(box, "box", filled);
@@ -202,7 +196,7 @@ maq_status maq_edges_curves_snap_to_pixel(const maq_edges_curves* curves, double
     require_range("radius_px", radius_px, 0.0, kMaxRadiusPx);
     if (curves->found.seen.width == 0) {
       throw ArgumentError(
-          "curves are of several views, which have no pixels in common; use "
+          "curves come from a fusion of several views, which have no common pixels; use "
           "maq_edges_curves_snap_to_ray.");
     }
     write_snap(snap_to(curves->found.seen, curves->found.curves, x_px, y_px, radius_px), snap);
@@ -216,7 +210,7 @@ maq_status maq_edges_curves_snap_to_ray(const maq_edges_curves* curves, const do
     require_argument(curves, "curves");
     const Vec3 from = read_vector(origin_m, "origin_m"), along = read_vector(direction, "direction");
     if (!(length(along) > 0) || !std::isfinite(length(along))) {
-      throw ArgumentError("direction has the length ", length(along), ", but must lead somewhere.");
+      throw ArgumentError("direction has the length ", length(along), ", but must be longer than 0 and finite.");
     }
     require_range("max_angle_rad", max_angle_rad, 0.0, 1.0);
     write_snap(snap_to_ray(curves->found.seen, curves->found.curves, from, along, max_angle_rad), snap);

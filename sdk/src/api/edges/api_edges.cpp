@@ -6,6 +6,7 @@
 #include "api/bundle_argument.h"
 #include "api/edges/edges_handle.h"
 #include "api/frame_handle.h"
+#include "api/model_options.h"
 #include "core/worker_threads.h"
 #include "edges/field_files.h"
 
@@ -13,11 +14,15 @@ using namespace maq;
 
 namespace {
 
+constexpr uint32_t kResultPool = 4, kMaxResultPool = 64;
+
+size_t pool_size_of(const maq_edges_config& config) {
+  return config.result_pool_size == 0 ? kResultPool : config.result_pool_size;
+}
+
 maq_edges_config default_edges_config() {
   maq_edges_config config{};
   config.struct_size = sizeof config;
-  config.result_pool_size = 4;
-  config.allow_spinning = 1;
   return config;
 }
 
@@ -29,16 +34,14 @@ maq_edges_config maq::read_edges_config(const maq_edges_config* given, const cha
 
 EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* name) {
   const std::string prefix = std::string(name) + ".";
-  require_threads(prefix + "threads", config.threads, kMaxThreads);
-  require_range(prefix + "result_pool_size", config.result_pool_size, 1u, 64u);
-  require_range(prefix + "allow_spinning", config.allow_spinning, 0, 1);
-  require_provider(prefix + "provider", config.provider);
+  require_model_options(prefix + "model", config.model);
+  require_range(prefix + "result_pool_size", config.result_pool_size, 0u, kMaxResultPool);
   require_range(prefix + "skip_planes", config.skip_planes, 0, 1);
-  require_range(prefix + "average_frames", config.average_frames, 0, RestingDepth::kMaxFrames);
+  require_range(prefix + "average_frames", config.average_frames, 0, DepthAverage::kMaxFrames);
   EdgesSettings settings;
-  settings.threads = config.threads != 0 ? config.threads : default_threads();
-  settings.spin = config.allow_spinning == 1;
-  settings.provider = config.provider;
+  settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
+  settings.spin = may_spin(config.model);
+  settings.provider = config.model.provider;
   settings.skips_planes = config.skip_planes == 1;
   settings.average_frames = std::max(config.average_frames, 1);
   return settings;
@@ -54,30 +57,24 @@ maq_status maq_edges_create(maq_context* context, const maq_edges_config* given,
     require_argument(edges, "edges");
     const maq_edges_config config = read_edges_config(given, "config");
     const EdgesSettings settings = edges_settings(config, "config");
-    Bundle bundle = read_bundle_argument(config, "config", kEdgesBundle);
+    Bundle bundle = read_bundle_argument(config.model, "config.model", kEdgesBundle);
     const Manifest manifest = bundle.manifest;
     auto made = std::make_unique<Edges>(context->state->onnxruntime(), std::move(bundle), settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
                                 ") loaded, ", made->threads(), " thread(s)");
-    *edges = new maq_edges(context->state, std::move(made), config.result_pool_size);
+    *edges = new maq_edges(context->state, std::move(made), pool_size_of(config));
     return MAQ_OK;
   });
 }
 
 void maq_edges_destroy(maq_edges* edges) { destroy(edges, "edges", __func__); }
 
-maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, const maq_intrinsics* intrinsics,
-                         maq_edges_result** result) {
+maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, maq_edges_result** result) {
   return guarded_alone(edges, "edges", __func__, [&] {
     require_argument(frame, "frame");
-    if (intrinsics == nullptr) {
-      throw ArgumentError(
-          "intrinsics is NULL, but lengths come from them; give those of the source (maq_source_get_intrinsics), or of "
-          "the camera's data sheet.");
-    }
     require_argument(result, "result");
     BoundedPool<maq_edges_result>::Pooled handle = edges->results.acquire();
-    edges->edges->run(frame->frame, *intrinsics, handle->result);
+    edges->edges->run(frame->frame, handle->result);
     handle->curves = edges->curves;
     *result = lend<maq_edges_result>(std::move(handle));
     return MAQ_OK;
@@ -120,7 +117,8 @@ maq_status maq_edges_result_get_plane(const maq_edges_result* result, maq_edges_
     const int32_t which = number_in(plane);
     require_range("plane", which, int32_t(MAQ_EDGES_PLANE_DISTANCE), int32_t(MAQ_EDGES_PLANE_DEPTH));
     const EdgeField& field = result->result.field;
-    const void* const all[] = {field.distance_r.data(), field.spread_r.data(), field.kind.data(), field.depth_m.data()};
+    const void* const all[] = {field.distance_r.data(), field.expected_error_r.data(), field.kind.data(),
+                               field.depth_m.data()};
     *values = all[which - MAQ_EDGES_PLANE_DISTANCE];
     *stride_bytes = size_t(field.width) * (which == MAQ_EDGES_PLANE_KIND ? sizeof(uint8_t) : sizeof(float));
     return MAQ_OK;
@@ -165,15 +163,15 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
   });
 }
 
-maq_status maq_edges_result_save(const maq_edges_result* result, const char* folder, const char* stem) {
+maq_status maq_edges_result_save(const maq_edges_result* result, const char* path) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
-    require_argument(folder, "folder");
-    require_argument(stem, "stem");
-    if (*stem == '\0' || std::strchr(stem, '/') != nullptr) {
-      throw ArgumentError("stem is \"", stem, "\", but must be the beginning of a file name, without a folder.");
+    require_argument(path, "path");
+    const size_t length = std::strlen(path);
+    if (length == 0 || path[length - 1] == '/') {
+      throw ArgumentError("path is \"", path, "\", but must end with the beginning of a file name: results/box.");
     }
-    write_field_files(result->result.field, folder, stem);
+    write_field_files(result->result.field, path);
     return MAQ_OK;
   });
 }

@@ -16,15 +16,11 @@ using namespace maq;
 namespace {
 
 constexpr size_t kCurvesPool = 4;
-constexpr float kFractionOfPoints = 0.9f;  // of the time of finish; curves take the rest
+constexpr float kFractionOfPoints = 0.9f;  // share of the points in the time of finish; the rest is for curves
 
 maq_edges_fusion_config default_fusion_config() {
-  const FusionOptions options;
   maq_edges_fusion_config config{};
   config.struct_size = sizeof config;
-  config.max_pixels = uint64_t(options.max_pixels);
-  config.max_points = uint64_t(options.max_points);
-  config.min_views = CurveFusionOptions().min_views;
   return config;
 }
 
@@ -32,19 +28,19 @@ FusionOptions fusion_options(const maq_edges_fusion_config& config) {
   constexpr uint64_t kMaxCount = uint64_t(1) << 32;
   require_range("config.threads", config.threads, 0, kMaxThreads);
   require_range("config.cell_m", config.cell_m, 0.0, 1e9);
-  require_range("config.max_pixels", config.max_pixels, uint64_t(1), kMaxCount);
-  require_range("config.max_points", config.max_points, uint64_t(1), kMaxCount - 2);
-  require_range("config.min_views", config.min_views, 1, 1000);
+  require_range("config.max_pixels", config.max_pixels, uint64_t(0), kMaxCount);
+  require_range("config.max_points", config.max_points, uint64_t(0), kMaxCount - 2);
+  require_range("config.min_views", config.min_views, 0, 1000);
   FusionOptions options;
   options.cell_m = config.cell_m;
-  options.max_pixels = int64_t(config.max_pixels);
-  options.max_points = int64_t(config.max_points);
+  if (config.max_pixels != 0) options.max_pixels = int64_t(config.max_pixels);
+  if (config.max_points != 0) options.max_points = int64_t(config.max_points);
   return options;
 }
 
 CurveFusionOptions curve_options(const maq_edges_fusion_config& config) {
   CurveFusionOptions options;
-  options.min_views = config.min_views;
+  if (config.min_views != 0) options.min_views = config.min_views;
   return options;
 }
 
@@ -78,7 +74,7 @@ maq_status maq_edges_fusion_create(maq_context* context, const maq_edges_fusion_
     require_argument(context, "context");
     require_argument(fusion, "fusion");
     const maq_edges_fusion_config config = read_config(given, "config", default_fusion_config());
-    fusion_options(config);  // checks it before threads start
+    fusion_options(config);  // checks the config before threads start
     *fusion = new maq_edges_fusion(config);
     return MAQ_OK;
   });
@@ -92,8 +88,9 @@ maq_status maq_edges_fusion_add_view(maq_edges_fusion* fusion, const maq_edges_r
     require_argument(result, "result");
     require_argument(camera, "camera");
     require_struct_size("camera", camera->struct_size, sizeof(maq_pinhole_camera));
-    const PinholeCamera pose = pinhole_of(*camera);
     const EdgeField& field = result->result.field;
+    PinholeCamera pose = pinhole_of(*camera);
+    if (pose.width_px == 0 && pose.height_px == 0) pose.intrinsics() = field.intrinsics;
     const EdgeCurves& curves = fusion->extractor.extract(field);
     fusion->fields.add_view(field, pose);
     fusion->curves.add_view(curves, pose);
@@ -124,7 +121,7 @@ maq_status maq_edges_fusion_finish(maq_edges_fusion* fusion) {
       fusion->is_cancelled = false;
       throw;
     }
-    fusion->is_cancelled = false;  // one that comes later is of the next
+    fusion->is_cancelled = false;  // a later request cancels the next call
     fusion->fusion_ms = float(total.elapsed_ms());
     return MAQ_OK;
   });
@@ -142,10 +139,10 @@ maq_status maq_edges_fusion_get_info(const maq_edges_fusion* fusion, maq_edges_f
   return guarded_alone(fusion, "fusion", __func__, [&] {
     maq_edges_fusion_info filled{};
     filled.view_count = uint32_t(fusion->fields.views());
-    filled.blind_view_count = uint32_t(fusion->fields.views_without_depth());
+    filled.empty_view_count = uint32_t(fusion->fields.views_without_depth());
     filled.point_count = fusion->found.points.size();
     filled.outside_pixel_count = uint64_t(fusion->found.outside_pixels);
-    filled.mixed_point_count = uint64_t(fusion->found.mixed_points);
+    filled.thin_point_count = uint64_t(fusion->found.mixed_points);
     filled.cell_m = fusion->found.cell_m;
     filled.eps_r = fusion->found.eps_r;
     filled.fusion_ms = fusion->fusion_ms;

@@ -11,10 +11,6 @@ using namespace maq;
 
 namespace {
 
-constexpr char kNoCamera[] =
-    "The source does not say how its camera maps directions to pixels, from which lengths come; add the horizontal "
-    "field of view in degrees to its URI, or focal lengths in pixels: fov=60, fx=380&fy=380.";
-
 struct EdgesOutput : LiveOutput {
   EdgesOutput() { set_held(false); }
   void set_held(bool is_held) noexcept override {
@@ -53,11 +49,9 @@ class EdgesModel : public LiveModel {
     edges_.swap(unloaded);
   }
 
-  void run(const Frame& frame, const maq_intrinsics* camera, std::unique_ptr<LiveOutput>& output) override {
-    if (camera == nullptr && depth_of(frame) != nullptr) throw Error(MAQ_ERROR_UNSUPPORTED, kNoCamera);
+  void run(const Frame& frame, const maq_intrinsics*, std::unique_ptr<LiveOutput>& output) override {
     auto& found = reuse_output<EdgesOutput>(output);
-    // Edges refuse a frame without depth, with or without a camera.
-    edges_->run(frame, camera == nullptr ? maq_intrinsics{} : *camera, found.edges.result);
+    edges_->run(frame, found.edges.result);
     found.edges.curves = pool_;
     found.has_curves = curves_.has_value();
     if (curves_) finder_.find(found.edges.result.field, *curves_, found.curves.found);
@@ -90,7 +84,7 @@ maq_status maq_edges_model_create(maq_context* context, const maq_edges_config* 
     const EdgesSettings settings = edges_settings(config, "config");
     std::optional<CurveRequest> request;
     if (curves != nullptr) request = curve_request(curves, "curves");
-    *model = new maq_model(std::make_shared<EdgesModel>(context->state, bundle_reader(config, "config", kEdgesBundle),
+    *model = new maq_model(std::make_shared<EdgesModel>(context->state, bundle_reader(config.model, "config.model", kEdgesBundle),
                                                         settings, request, config.result_pool_size));
     return MAQ_OK;
   });

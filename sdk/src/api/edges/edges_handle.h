@@ -9,13 +9,13 @@
 
 namespace maq {
 
-// The bundle that a config without one means.
+// The default bundle.
 inline constexpr char kEdgesBundle[] = "edges-int8";
 
-// The caller's config on top of the defaults; NULL means the defaults. `name` begins error texts.
+// Returns the caller's config, or the defaults for NULL. `name` begins error texts.
 maq_edges_config read_edges_config(const maq_edges_config* given, const char* name);
 
-// Throws ArgumentError for what is out of range; `name` is that of the config.
+// Throws ArgumentError for a value out of range. `name` is the name of the config.
 EdgesSettings edges_settings(const maq_edges_config& config, const char* name);
 
 // Checks a config and converts it to a request; `name` begins error texts.
@@ -23,7 +23,7 @@ CurveRequest curve_request(const maq_edges_curves_config* given, const char* nam
 
 }  // namespace maq
 
-// Curves stay what they are while the app has them, so that all threads may read them.
+// Curves do not change while the app holds them, so that all threads may read them.
 struct maq_edges_curves : maq::HandleOf<maq::HandleKind::kEdgesCurves> {
   maq::FoundCurves found;
   maq::CurveFinder finder;
@@ -32,7 +32,7 @@ struct maq_edges_curves : maq::HandleOf<maq::HandleKind::kEdgesCurves> {
 
 struct maq_edges_result : maq::HandleOf<maq::HandleKind::kEdgesResult> {
   maq::EdgesResult result;
-  std::optional<maq::BoundedPool<maq_edges_curves>> curves;  // lends what is found in it
+  std::optional<maq::BoundedPool<maq_edges_curves>> curves;  // lends the curves that are found in it
   maq::BoundedPool<maq_edges_result>::Deleter deleter;
 };
 

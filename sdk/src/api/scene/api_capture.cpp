@@ -86,7 +86,9 @@ maq_status maq_capture_load_depth(const maq_capture* capture, uint32_t index, ma
     PinholeCamera of_depth;
     load_depth(capture->capture.views[index], made->frame, of_depth);
     made->frame.sequence = index;
-    write_struct(camera, "camera", camera_of(of_depth));
+    const maq_pinhole_camera pinhole = camera_of(of_depth);
+    made->frame.intrinsics = pinhole.intrinsics;
+    write_struct(camera, "camera", pinhole);
     *frame = made.release();
     return MAQ_OK;
   });

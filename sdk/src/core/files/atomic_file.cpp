@@ -41,9 +41,9 @@ int descriptor_of(std::string_view path) {
   return -1;
 }
 
-// What the path leads to, which need not exist yet.
+// Returns the target of the path, which need not exist yet.
 std::string without_links(std::string path) {
-  constexpr int kMaxLinks = 40;  // of the kernel; stat() has refused more
+  constexpr int kMaxLinks = 40;  // limit of the kernel; stat() has refused more
   char link[PATH_MAX];
   for (int links = 0; links < kMaxLinks && descriptor_of(path) < 0; ++links) {
     const ssize_t length = ::readlink(path.c_str(), link, sizeof link);

@@ -14,7 +14,7 @@ namespace maq {
 
 class AtomicFile {
  public:
-  // Of a symbolic link, the file that it leads to is written. Character devices, pipes and descriptors by their name
+  // Writes to the file behind a symbolic link. Character devices, pipes and descriptors by their name
   // (/dev/stdout, /dev/fd/3) keep their place: they get all bytes at once from commit(). Folders are not made.
   // Throws MAQ_ERROR_UNWRITABLE where the folder does not exist or may not be written to, and where `path` is something
   // else: a folder, a disk. `temporary_extension` ends the temporary name, for libraries that choose a format by it;
@@ -33,7 +33,7 @@ class AtomicFile {
 
   // Writes at the end. Throws MAQ_ERROR_UNWRITABLE, as on a full disk.
   void append(const void* bytes, size_t count);
-  // Replaces bytes that were appended before. Throws likewise.
+  // Replaces bytes that were appended before. Throws MAQ_ERROR_UNWRITABLE.
   void overwrite(uint64_t offset, const void* bytes, size_t count);
 
   // Gives the file its name, in place of one that has it. Throws MAQ_ERROR_UNWRITABLE; then the old file is unchanged.

@@ -19,7 +19,7 @@ class BlockedWriteSignals {
     sigset_t pending;
     sigpending(&pending);
     for (const int number : {SIGXFSZ, SIGPIPE}) {
-      if (sigismember(&pending, number) == 1) sigdelset(&ours_, number);  // of another cause; it stays pending
+      if (sigismember(&pending, number) == 1) sigdelset(&ours_, number);  // another cause; it stays pending
     }
     pthread_sigmask(SIG_BLOCK, &ours_, &before_);
   }

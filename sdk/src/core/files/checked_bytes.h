@@ -12,11 +12,11 @@
 
 namespace maq {
 
-// What such a file begins with.
+// The head of such a file.
 struct FileStart {
   char magic[8];
   uint32_t version;
-  uint32_t head_bytes;  // of the whole struct that begins with this
+  uint32_t head_bytes;  // size of the whole struct that begins with this
   uint64_t check;       // 64-bit XXH3 of all that follows in the file
   uint64_t file_bytes;
 };
@@ -50,7 +50,7 @@ class CheckedBytes {
     const uint8_t* const from = take(count);
     return {from, from + count};
   }
-  // Of float32. Throws for one that is not finite, or too large.
+  // Reads float32. Throws for a number that is not finite, or too large.
   std::vector<float> floats(size_t count);
 
   // A number of the head that must be 1 to `max`. `what`: "slices".

@@ -33,7 +33,7 @@ OpenFile open_file(const std::string& path);
 using StartCheck = std::function<void(const std::vector<uint8_t>& start)>;
 
 // Reads a regular file, or a pipe such as /dev/stdin, to its end. `check_start` gets its first 64 KiB, or the whole of
-// what is shorter, before more is read. Throws what open_file() throws, and MAQ_ERROR_UNREADABLE when there are more
+// what is shorter, before more is read. Throws the errors of open_file(), and MAQ_ERROR_UNREADABLE when there are more
 // than `max_bytes`, no program writes to the pipe, or its writer gives nothing for 10 seconds.
 std::vector<uint8_t> read_file(const std::string& path, uint64_t max_bytes, const StartCheck& check_start = {});
 

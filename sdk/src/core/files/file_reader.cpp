@@ -103,7 +103,7 @@ bool parse_number(std::string_view text, double& number) {
   if (!text.empty() && text[0] == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error == std::errc::result_out_of_range) {
-    // As strtod: what underflows is 0, what overflows is infinite.
+    // Like strtod: an underflow is 0, an overflow is infinite.
     const bool is_small = text.find("e-") != std::string_view::npos || text.find("E-") != std::string_view::npos;
     number = is_small ? 0 : HUGE_VAL;
     return end == text.data() + text.size();
@@ -115,7 +115,7 @@ bool parse_number(std::string_view text, double& number) {
 
 bool parse_number(std::string_view text, double& number) {
   if (!text.empty() && text[0] == '+') text.remove_prefix(1);
-  // What strtod takes besides: space before the number, a second sign, hexadecimal numbers.
+  // Refuses forms that strtod accepts: space before the number, a second sign, hexadecimal numbers.
   if (text.empty() || is_space(text[0]) || text[0] == '+' || text.find_first_of("xX") != text.npos) return false;
   const std::string word(text);
   char* end = nullptr;

@@ -19,13 +19,13 @@ enum class ByteOrder { kLittle, kBig };
 
 class FileReader {
  public:
-  // Throws what open_file() throws.
+  // Throws the errors of open_file().
   explicit FileReader(std::string path);
 
   const std::string& path() const { return path_; }
   // Bytes that have not been read or skipped yet.
   uint64_t remaining() const { return file_.size_bytes - buffer_offset_ - position_; }
-  // Of the line or word that was read last, from 1.
+  // Returns the number of the latest line, from 1.
   uint64_t line() const { return line_; }
 
   // Both throw MAQ_ERROR_UNREADABLE when the file ends before.
@@ -67,7 +67,7 @@ class FileReader {
 
   std::string path_;
   OpenFile file_;
-  uint64_t buffer_offset_ = 0;  // of the buffer's first byte in the file
+  uint64_t buffer_offset_ = 0;  // position of the buffer's first byte in the file
   std::unique_ptr<uint8_t[]> buffer_;
   size_t position_ = 0, filled_ = 0;
   uint64_t line_ = 0;

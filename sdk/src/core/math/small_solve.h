@@ -45,7 +45,7 @@ struct PrincipalAxes {
   std::array<Vec3, 3> axis;
 };
 
-// Of a symmetric 3x3 matrix (xx, xy, xz, yy, yz, zz), by Jacobi rotations.
+// Decomposes a symmetric 3x3 matrix (xx, xy, xz, yy, yz, zz), by Jacobi rotations.
 inline PrincipalAxes principal_axes(const std::array<double, 6>& m) {
   double a[3][3] = {{m[0], m[1], m[2]}, {m[1], m[3], m[4]}, {m[2], m[4], m[5]}};
   double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};

@@ -18,7 +18,7 @@ inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a
 inline double length(Vec3 a) { return std::sqrt(dot(a, a)); }
 inline bool is_finite(Vec3 a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 
-// Of length 1; 0 stays 0.
+// Scales to length 1; 0 stays 0.
 inline Vec3 normalized(Vec3 a) {
   const double l = length(a);
   return l > 0 ? (1 / l) * a : Vec3{};

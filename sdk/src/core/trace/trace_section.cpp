@@ -5,7 +5,7 @@
 namespace maq {
 namespace {
 
-// Of the NDK's <android/trace.h>.
+// Functions of the NDK's <android/trace.h>.
 struct TraceFunctions {
   bool (*is_enabled)() = nullptr;
   void (*begin_section)(const char*) = nullptr;

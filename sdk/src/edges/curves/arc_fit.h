@@ -9,7 +9,7 @@
 namespace maq {
 
 // centre + cos(a) x_axis + sin(a) y_axis, 0 <= a <= sweep_rad; the axes are orthogonal and as long as the radius. Seen
-// from the origin, the camera, it runs clockwise in a picture whose y goes down.
+// from the origin, the camera, it runs clockwise in an image whose y axis points down.
 struct ArcFit {
   Vec3 centre, x_axis, y_axis;
   double sweep_rad = 0;
@@ -19,9 +19,9 @@ struct ArcFit {
 
 class ArcFitter {
  public:
-  // By Gauss-Newton on the distances to the circle, in the plane of least squares. Nothing where a straight line says
-  // as much (the arc's height is within its points' noise), where fewer than four points are given, or where they are
-  // not finite. The order of points has no effect.
+  // Fits by Gauss-Newton on the distances to the circle, in the plane of least squares. Returns nothing where a
+  // straight line fits as well (the height of the arc is within the noise of its points), for fewer than four points,
+  // and for points that are not finite. The order of points has no effect.
   std::optional<ArcFit> fit(const FitPoint* points, size_t count);
 
  private:

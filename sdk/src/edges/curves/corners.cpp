@@ -12,19 +12,19 @@ constexpr double kOverlap_px = 4;  // how far a curve may have run beyond the co
 constexpr double kFixed = 0.01;    // weight of the ends' middle against the lines through them
 constexpr double kParallelSine = 0.2;
 
-bool meet(const CurveEnd& a, const CurveEnd& b, double join_px) {
+bool meet(const CurveEnd& a, const CurveEnd& b, double merge_radius_px) {
   const double r = std::max(a.r_m, b.r_m);
   const Vec3 between = b.point - a.point;
   const double distance = length(between);
-  if (!(distance <= 2 * join_px * std::max(a.step_m, b.step_m))) return false;
+  if (!(distance <= 2 * merge_radius_px * std::max(a.step_m, b.step_m))) return false;
   const double cosine = dot(a.outward, b.outward), sine_squared = 1 - cosine * cosine;
   if (sine_squared < kParallelSine * kParallelSine) return distance <= kMiss_r * r;
   // The nearest points of the two lines.
   const double pa = dot(between, a.outward), pb = -dot(between, b.outward);
   const double s = (pa + cosine * pb) / sine_squared, t = (pb + cosine * pa) / sine_squared;
   const Vec3 miss = between + t * b.outward - s * a.outward;
-  return length(miss) <= kMiss_r * r && s >= -kOverlap_px * a.step_m && s <= join_px * a.step_m &&
-         t >= -kOverlap_px * b.step_m && t <= join_px * b.step_m;
+  return length(miss) <= kMiss_r * r && s >= -kOverlap_px * a.step_m && s <= merge_radius_px * a.step_m &&
+         t >= -kOverlap_px * b.step_m && t <= merge_radius_px * b.step_m;
 }
 
 Vec3 nearest_to_all(const std::vector<CurveEnd>& ends, const std::vector<int>& group, int root) {
@@ -52,7 +52,7 @@ Vec3 nearest_to_all(const std::vector<CurveEnd>& ends, const std::vector<int>& g
 
 }  // namespace
 
-void CornerFinder::find(std::vector<CurveEnd>& ends, double join_px, std::vector<EdgeCorner>& corners) {
+void CornerFinder::find(std::vector<CurveEnd>& ends, double merge_radius_px, std::vector<EdgeCorner>& corners) {
   corners.clear();
   const auto n = int(ends.size());
   group_.resize(ends.size());
@@ -63,7 +63,7 @@ void CornerFinder::find(std::vector<CurveEnd>& ends, double join_px, std::vector
   };
   for (int i = 0; i < n; ++i) {
     for (int j = i + 1; j < n; ++j) {
-      if (!meet(ends[size_t(i)], ends[size_t(j)], join_px)) continue;
+      if (!meet(ends[size_t(i)], ends[size_t(j)], merge_radius_px)) continue;
       const int a = root_of(i), b = root_of(j);
       group_[size_t(std::max(a, b))] = std::min(a, b);
     }
@@ -80,7 +80,7 @@ void CornerFinder::find(std::vector<CurveEnd>& ends, double join_px, std::vector
         const CurveEnd& end = ends[size_t(i)];
         const Vec3 off = point - end.point;
         const bool passes = length(cross(off, end.outward)) <= kMiss_r * end.r_m &&
-                            std::abs(dot(off, end.outward)) <= 1.5 * join_px * end.step_m;
+                            std::abs(dot(off, end.outward)) <= 1.5 * merge_radius_px * end.step_m;
         if (!passes) group_[size_t(i)] = -1;
       }
       if (std::count(group_.begin(), group_.end(), root) == 0) break;

@@ -1,4 +1,4 @@
-// Corners: where the ends of curves meet in space.
+// Corners: points where the ends of curves meet in space.
 #pragma once
 
 #include <vector>
@@ -20,9 +20,10 @@ struct CurveEnd {
 
 class CornerFinder {
  public:
-  // Groups ends whose curves, made longer, meet within `join_px` pixels of them; sets CurveEnd::corner. A corner is the
-  // point nearest to all its curves, or the middle of the ends as far as the curves run the same way and do not tell.
-  void find(std::vector<CurveEnd>& ends, double join_px, std::vector<EdgeCorner>& corners);
+  // Groups ends whose curves, made longer, meet within `merge_radius_px` pixels of them; sets CurveEnd::corner. A
+  // corner is the point nearest to all its curves, or the middle of the ends as far as the curves run the same way and
+  // do not tell.
+  void find(std::vector<CurveEnd>& ends, double merge_radius_px, std::vector<EdgeCorner>& corners);
 
  private:
   std::vector<int> group_;

@@ -9,12 +9,12 @@
 namespace maq {
 namespace {
 
-constexpr double kWorst_r = 3;        // a curve farther than that from its points is none
-constexpr double kBestSigma_r = 0.1;  // no station counts for more than one known so well
-constexpr double kMisplaced_px = 2;   // of a line's ends from where they are seen
-constexpr double kMaxBeyond_px = 6;   // of a curve's ends beyond its first and last station
+constexpr double kWorst_r = 3;        // a curve farther from its points is rejected
+constexpr double kBestSigma_r = 0.1;  // upper limit of the weight of a station
+constexpr double kMisplaced_px = 2;   // distance of a line's ends from their place in the image
+constexpr double kMaxBeyond_px = 6;   // distance of a curve's ends beyond its first and last station
 constexpr int kMaxOffEnds = 3;
-constexpr int kLengthen_px = 6;  // votes are followed so far beyond a free end
+constexpr int kLengthen_px = 6;  // distance over which votes are followed beyond a free end
 
 void require(bool is_right, const char* name, double value, const char* range) {
   if (!is_right) {
@@ -25,11 +25,11 @@ void require(bool is_right, const char* name, double value, const char* range) {
 void check_field(const EdgeField& field) {
   const bool has_size = field.width >= 0 && field.height >= 0;
   const size_t pixels = has_size ? size_t(field.width) * size_t(field.height) : 0;
-  if (!has_size || field.distance_r.size() != pixels || field.spread_r.size() != pixels ||
+  if (!has_size || field.distance_r.size() != pixels || field.expected_error_r.size() != pixels ||
       field.kind.size() != pixels || field.depth_m.size() != pixels) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The distance field's planes have ", field.distance_r.size(), ", ",
-                field.spread_r.size(), ", ", field.kind.size(), " and ", field.depth_m.size(), " values, not those of ",
-                field.width, "x", field.height, " pixels.");
+                field.expected_error_r.size(), ", ", field.kind.size(), " and ", field.depth_m.size(),
+                " values, not those of ", field.width, "x", field.height, " pixels.");
   }
   const Intrinsics& camera = field.intrinsics;
   if (!(camera.fx_px > 0 && camera.fy_px > 0 && std::isfinite(camera.fx_px + camera.fy_px) &&
@@ -39,7 +39,7 @@ void check_field(const EdgeField& field) {
   }
 }
 
-// The point of the line through `a` along `direction` that the pixel's ray comes nearest to.
+// Returns the point of the line through `a` along `direction` that is nearest to the pixel's ray.
 Vec3 seen_on_line(const Intrinsics& camera, double x, double y, Vec3 a, Vec3 direction) {
   const Vec3 ray = normalized({(x - camera.cx_px) / camera.fx_px, (y - camera.cy_px) / camera.fy_px, 1});
   const double cosine = dot(ray, direction), sine_squared = 1 - cosine * cosine;
@@ -55,12 +55,12 @@ Pixel project(const Intrinsics& camera, Vec3 p) {
   return {camera.fx_px * p.x / p.z + camera.cx_px, camera.fy_px * p.y / p.z + camera.cy_px};
 }
 
-// The part of an arc from an angle of it onward.
+// Takes the part of an arc that begins at an angle.
 void take_arc(const ArcFit& arc, double from_rad, double sweep_rad, EdgeCurve& curve, std::array<Vec3, 2>& end,
               std::array<Vec3, 2>& outward) {
   const double c = std::cos(from_rad), s = std::sin(from_rad);
   curve.type = CurveType::kArc;
-  curve.rms_r = arc.rms;
+  curve.rms_footprints = arc.rms;
   curve.centre = arc.centre;
   curve.x_axis = c * arc.x_axis + s * arc.y_axis;
   curve.y_axis = c * arc.y_axis - s * arc.x_axis;
@@ -74,15 +74,17 @@ void take_arc(const ArcFit& arc, double from_rad, double sweep_rad, EdgeCurve& c
 
 CurveExtractor::CurveExtractor(const CurveOptions& options) : options_(options) {
   const CurveOptions& o = options;
-  require(o.select_px > 0 && o.select_px <= 16, "select_px", o.select_px, "above 0 and at most 16");
+  require(o.vote_radius_px > 0 && o.vote_radius_px <= 16, "vote_radius_px", o.vote_radius_px, "above 0 and at most 16");
   require(o.min_votes > 0 && o.min_votes <= 100, "min_votes", o.min_votes, "above 0 and at most 100");
-  require(o.smear_px >= 0 && o.smear_px <= 32, "smear_px", o.smear_px, "0 to 32");
-  require(o.support_px >= 2 && o.support_px <= 64, "support_px", o.support_px, "2 to 64");
-  require(o.break_deg > 0 && o.break_deg <= 180, "break_deg", o.break_deg, "above 0 and at most 180");
+  require(o.flying_pixel_band_px >= 0 && o.flying_pixel_band_px <= 32, "flying_pixel_band_px", o.flying_pixel_band_px,
+          "0 to 32");
+  require(o.fit_band_px >= 2 && o.fit_band_px <= 64, "fit_band_px", o.fit_band_px, "2 to 64");
+  require(o.split_angle_deg > 0 && o.split_angle_deg <= 180, "split_angle_deg", o.split_angle_deg,
+          "above 0 and at most 180");
   require(o.min_length_px >= 4 && o.min_length_px <= 1e6f, "min_length_px", o.min_length_px, "4 to 1e6");
   require(o.tolerance_r > 0 && o.tolerance_r <= 16, "tolerance_r", o.tolerance_r, "above 0 and at most 16");
   require(o.gap_r > 0 && o.gap_r <= 1e6f, "gap_r", o.gap_r, "above 0 and at most 1e6");
-  require(o.join_px >= 0 && o.join_px <= 64, "join_px", o.join_px, "0 to 64");
+  require(o.merge_radius_px >= 0 && o.merge_radius_px <= 64, "merge_radius_px", o.merge_radius_px, "0 to 64");
   require(o.max_curves > 0 && o.max_curves <= 1 << 16, "max_curves", o.max_curves, "1 to 65536");
 }
 
@@ -94,7 +96,7 @@ const EdgeCurves& CurveExtractor::extract(const EdgeField& field) {
   found_.controls.clear();
   found_.counts = CurveCounts();
   drafts_.clear();
-  votes_.gather(field, options_.select_px, found_.counts);
+  votes_.gather(field, options_.vote_radius_px, found_.counts);
   chains_.trace(votes_, options_, found_.counts);
   for (const RidgeChain& chain : chains_.chains) draft_curves(field, chain);
   join_corners(field);
@@ -112,7 +114,7 @@ void CurveExtractor::draft_curves(const EdgeField& field, const RidgeChain& chai
 }
 
 void CurveExtractor::draft_runs(const EdgeField& field, const RidgeChain& chain) {
-  // An arc goes on where its kind changes: the rim of a cup is one circle, its far half a boundary.
+  // An arc continues where its kind changes: the rim of a cup is one circle, and its far half is a boundary.
   if (!stations_.is_straight && stations_.runs.size() > 1 && draft_arcs(field, chain)) return;
   for (const StationRun& run : stations_.runs) {
     Draft draft;
@@ -124,8 +126,8 @@ void CurveExtractor::draft_runs(const EdgeField& field, const RidgeChain& chain)
   }
 }
 
-// Of the stations that have a point. Those at the ends are near a corner and may have seen another surface: what is far
-// away from the next one is left out.
+// Gathers the stations that have a point. Stations at the ends are near a corner and may have measured another surface.
+// They are left out if they are far from the next station.
 void CurveExtractor::gather_points(const EdgeField& field, const StationRun& run) {
   fit_points_.clear();
   int from = run.first, to = run.first + run.count - 1;
@@ -146,7 +148,7 @@ void CurveExtractor::gather_points(const EdgeField& field, const StationRun& run
   }
 }
 
-// One circle through all runs, and of each its part.
+// Fits one circle to all runs. Each run becomes a part of it.
 bool CurveExtractor::draft_arcs(const EdgeField& field, const RidgeChain& chain) {
   const auto n = int(stations_.stations.size());
   gather_points(field, {0, n, kCreaseEdge, -1});
@@ -158,7 +160,7 @@ bool CurveExtractor::draft_arcs(const EdgeField& field, const RidgeChain& chain)
     return std::atan2(dot(d, arc->y_axis), dot(d, arc->x_axis));
   };
   for (const StationRun& run : stations_.runs) {
-    // From halfway to the station before to halfway to the one after.
+    // The part begins halfway to the previous station and ends halfway to the next one.
     const bool has_before = run.first > 0 || chain.is_closed, has_after = run.first + run.count < n || chain.is_closed;
     double before = angle_of(run.first), angle = before, sweep = 0, lead = 0;
     for (int k = run.first + 1; k < run.first + run.count; ++k) {
@@ -178,7 +180,7 @@ bool CurveExtractor::draft_arcs(const EdgeField& field, const RidgeChain& chain)
   return true;
 }
 
-// The simplest type that is near enough to the stations' points: line, arc, spline.
+// Takes the simplest type that is near enough to the points of the stations: line, arc, spline.
 bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, const StationRun& run, Draft& draft) {
   EdgeCurve& curve = draft.curve;
   curve.kind = run.kind;
@@ -191,7 +193,7 @@ bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, co
   if (!is_closed && (line->rms <= options_.tolerance_r || stations_.is_straight)) {
     if (!(line->rms <= kWorst_r)) return false;
     curve.type = CurveType::kLine;
-    curve.rms_r = line->rms;
+    curve.rms_footprints = line->rms;
     draft.end = {line->from, line->to};
     if (stations_.is_straight && !place_line(field, chain, run, draft)) return false;
     const Vec3 along = normalized(draft.end[1] - draft.end[0]);
@@ -206,7 +208,7 @@ bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, co
   const auto rms = spline_fitter_.fit(points, count, is_closed, options_.tolerance_r);
   if (!rms || !(*rms <= kWorst_r)) return false;
   curve.type = CurveType::kSpline;
-  curve.rms_r = *rms;
+  curve.rms_footprints = *rms;
   curve.is_closed = is_closed;
   curve.first_control = int(found_.controls.size());
   const auto& controls = spline_fitter_.controls();
@@ -218,8 +220,8 @@ bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, co
   return true;
 }
 
-// Stations are the middles of what they measured: the edge is as long as its chain, or as its run of stations. False
-// where it does not cover that in the picture: it runs along the rays, between surfaces.
+// A station is the middle of the piece it measured: the edge is as long as its chain, or its run of stations. Returns
+// false if the line does not cover this length in the image: then it runs along the rays, between surfaces.
 bool CurveExtractor::place_line(const EdgeField& field, const RidgeChain& chain, const StationRun& run,
                                 Draft& draft) const {
   const Vec3 a = draft.end[0], along = normalized(draft.end[1] - a);
@@ -245,8 +247,8 @@ bool CurveExtractor::place_line(const EdgeField& field, const RidgeChain& chain,
   return true;
 }
 
-// Whether a curve runs along the rays between two surfaces rather than along one: its ends are not seen where its
-// stations end, or a line is within 10 degrees of a ray.
+// Returns whether a curve runs along the rays between two surfaces rather than along one: its ends do not appear where
+// its stations end, or a line is within 10 degrees of a ray.
 bool CurveExtractor::is_along_rays(const EdgeField& field, const StationRun& run, const Draft& draft) const {
   const CurveStation &first = stations_.stations[size_t(run.first)],
                      &last = stations_.stations[size_t(run.first + run.count) - 1];
@@ -257,7 +259,7 @@ bool CurveExtractor::is_along_rays(const EdgeField& field, const StationRun& run
         std::min(std::hypot(seen.x - first.x, seen.y - first.y), std::hypot(seen.x - last.x, seen.y - last.y));
     if (!(off <= kMaxBeyond_px)) return true;
   }
-  // At its near end, where a real one that goes away from the camera is seen most from the side.
+  // The angle is measured at the near end, where a real receding line is seen most from the side.
   const Vec3 near = draft.end[0].z < draft.end[1].z ? draft.end[0] : draft.end[1];
   const double sine = length(cross(normalized(near), normalized(draft.end[1] - draft.end[0])));
   return draft.curve.type == CurveType::kLine && sine < 1 / kLongestStep_r;
@@ -280,8 +282,8 @@ void CurveExtractor::keep(const EdgeField& field, const StationRun& run, Draft& 
   drafts_.push_back(draft);
 }
 
-// Planes beside a straight edge, and on which side of a crease the solid is: at a place beside the edge, is the other
-// surface, made longer, before or behind it?
+// Finds the adjacent planes of a straight edge and the convexity of a crease: at a point beside the edge, is the other
+// surface, extended, in front of it or behind it?
 void CurveExtractor::describe_sides(const EdgeField& field, const StationRun& run, EdgeCurve& curve) const {
   const double focal = focal_px(field.intrinsics);
   int convex = 0;
@@ -295,7 +297,7 @@ void CurveExtractor::describe_sides(const EdgeField& field, const StationRun& ru
     const double sigma = std::hypot(s.side[0].edge_sigma_r, s.side[1].edge_sigma_r);
     if (std::abs(behind_r) > 3 * sigma) convex += behind_r > 0 ? 1 : -1;
   }
-  if (curve.kind == kCreaseEdge && convex != 0) curve.bend = convex > 0 ? Bend::kConvex : Bend::kConcave;
+  if (curve.kind == kCreaseEdge && convex != 0) curve.convexity = convex > 0 ? Convexity::kConvex : Convexity::kConcave;
   const CurveStation& middle = stations_.stations[size_t(run.first + run.count / 2)];
   for (size_t side = 0; side < 2; ++side) {
     const SurfacePatch& patch = stations_.whole_side[side];
@@ -305,8 +307,8 @@ void CurveExtractor::describe_sides(const EdgeField& field, const StationRun& ru
   }
 }
 
-// The votes of a corner have many directions, so that chains end before it: a line goes on as far as there are votes
-// for it.
+// The votes of a corner have many directions, so that chains end before it. A line is extended as far as there are
+// votes for it.
 void CurveExtractor::lengthen_end(const EdgeField& field, Draft& draft, int which) const {
   if (draft.curve.type != CurveType::kLine) return;
   const Vec3 end = draft.end[size_t(which)], outward = draft.outward[size_t(which)];
@@ -337,7 +339,7 @@ void CurveExtractor::join_corners(const EdgeField& field) {
                        draft.step_m[size_t(k)], -1});
     }
   }
-  corner_finder_.find(ends_, options_.join_px, found_.corners);
+  corner_finder_.find(ends_, options_.merge_radius_px, found_.corners);
   for (Draft& draft : drafts_) draft.curve.corner = {-1, -1};
   for (const CurveEnd& end : ends_) {
     Draft& draft = drafts_[size_t(end.curve)];
@@ -351,7 +353,7 @@ void CurveExtractor::move_end(Draft& draft, int which, Vec3 to) {
   if (curve.type == CurveType::kArc) {
     const Vec3 d = to - curve.centre;
     const double angle = std::atan2(dot(d, curve.y_axis), dot(d, curve.x_axis));
-    const double reach = draft.step_m[size_t(which)] * 1.5 * options_.join_px / length(curve.x_axis);
+    const double reach = draft.step_m[size_t(which)] * 1.5 * options_.merge_radius_px / length(curve.x_axis);
     if (which == 1) {
       const double change = std::remainder(angle - curve.sweep_rad, 2 * M_PI);
       if (std::abs(change) <= reach) curve.sweep_rad = std::clamp(curve.sweep_rad + change, 1e-6, 2 * M_PI);

@@ -15,12 +15,12 @@ namespace maq {
 
 class CurveExtractor {
  public:
-  // Throws MAQ_ERROR_INVALID_ARGUMENT where an option is not in its range.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for an option out of range.
   explicit CurveExtractor(const CurveOptions& options = {});
 
-  // Valid until the next call; memory is kept from frame to frame. What a field says does not have to make sense: what
-  // is not a number is left out and counted, a field without edges has no curves. Throws MAQ_ERROR_INVALID_ARGUMENT
-  // where its planes have not width * height values or its focal lengths are not above 0.
+  // Returns curves that are valid until the next call. Keeps memory from frame to frame. Accepts any field: values that
+  // are not numbers are dropped and counted, a field without edges has no curves. Throws MAQ_ERROR_INVALID_ARGUMENT for
+  // planes of another size and focal lengths that are not positive.
   const EdgeCurves& extract(const EdgeField& field);
 
  private:

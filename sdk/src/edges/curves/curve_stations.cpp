@@ -9,14 +9,14 @@ namespace maq {
 namespace {
 
 constexpr double kStraightSpacing_px = 6, kCurvedSpacing_px = 3, kCurvedHalfWindow_px = 4;
-constexpr double kMinShift_px = 1;            // pixels nearer to the edge are rounded by what the field was made of
-constexpr double kFallen_px = 3;              // nearer to the edge the field says nothing about another one
+constexpr double kMinShift_px = 1;            // the network blurs pixels nearer to the edge
+constexpr double kFallen_px = 3;              // nearer to the edge the field does not show another one
 constexpr double kFarthestShift_px = 5;       // the field's value is best near the edge
-constexpr double kBelief_px = 2.5;            // values that want to move it farther are of another edge
+constexpr double kBelief_px = 2.5;            // values that would move it farther belong to another edge
 constexpr double kClearly_px = 2;             // by which the field has the edge nearer on the side that it belongs to
-constexpr double kBestAcross_px = 0.08;       // no place in the picture is believed to be known better
-constexpr double kSamePlace_px = 1;           // edges of a near and a far surface so near in the picture are one chain
-constexpr double kApart_r = 2;                // nearer surfaces' edges are one
+constexpr double kBestAcross_px = 0.08;       // lower limit of the uncertainty of a position in the image
+constexpr double kSamePlace_px = 1;           // edges of a near and a far surface this close in the image are one chain
+constexpr double kApart_r = 2;                // edges of surfaces nearer than this are one
 constexpr double kNoisy_r = 1.5, kWider = 3;  // depth that is so far from its surface needs a band so much wider
 constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // what is that much worse is another surface, or smears
 constexpr int kStray = 2;                               // stations that may have seen something else
@@ -156,17 +156,17 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, c
 SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                      int side, double half_window_px, bool may_bend) {
   // Away from what smears; where the surface is too narrow for that, nearer.
-  const Band band{side, half_window_px, double(options.smear_px) + double(options.support_px), 1};
+  const Band band{side, half_window_px, double(options.flying_pixel_band_px) + double(options.fit_band_px), 1};
   for (const double smear : {1.0, 0.5, 0.15}) {
     band_.clear();
-    gather_band(field, s, band, smear * options.smear_px + 0.5);
+    gather_band(field, s, band, smear * options.flying_pixel_band_px + 0.5);
     if (band_.size() >= 12) break;
   }
   const SurfacePatch patch = fitter_.fit(band_, s.x, s.y, focal_px(field.intrinsics), may_bend);
-  if (patch.terms == 0 || !(patch.rms_r > kNoisy_r)) return patch;
+  if (patch.terms == 0 || !(patch.rms_footprints > kNoisy_r)) return patch;
   narrow_.swap(band_);
   const SurfacePatch wide = fit_noisy_side(field, options, s, side, half_window_px, may_bend);
-  if (wide.terms != 0 && wide.rms_r <= kSameNoise * patch.rms_r) return wide;
+  if (wide.terms != 0 && wide.rms_footprints <= kSameNoise * patch.rms_footprints) return wide;
   band_.swap(narrow_);
   return patch;
 }
@@ -175,9 +175,11 @@ SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions&
 // elsewhere, else what is away from the edge.
 SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                            int side, double half_window_px, bool may_bend) {
-  const double focal = focal_px(field.intrinsics), away_px = double(options.smear_px) + 0.5;
+  const double focal = focal_px(field.intrinsics), away_px = double(options.flying_pixel_band_px) + 0.5;
   band_.clear();
-  gather_band(field, s, {side, half_window_px, double(options.smear_px) + kWider * double(options.support_px), 2}, 0.5);
+  gather_band(field, s,
+              {side, half_window_px, double(options.flying_pixel_band_px) + kWider * double(options.fit_band_px), 2},
+              0.5);
   const SurfacePatch whole = fitter_.fit(band_, s.x, s.y, focal, may_bend);
   double squares = 0, squares_away = 0, count_away = 0;
   for (const BandPixel& pixel : band_) {
@@ -229,7 +231,7 @@ void CurveStations::fit_whole_sides(const EdgeField& field) {
   for (size_t side = 0; side < 2 && is_straight; ++side) {
     residuals_.clear();
     for (const CurveStation& s : stations) {
-      if (s.side[side].terms != 0) residuals_.push_back(s.side[side].rms_r);
+      if (s.side[side].terms != 0) residuals_.push_back(s.side[side].rms_footprints);
     }
     if (residuals_.size() < (stations.size() + 1) / 2) continue;
     const auto middle = residuals_.begin() + std::ptrdiff_t(residuals_.size() / 2);
@@ -238,11 +240,11 @@ void CurveStations::fit_whole_sides(const EdgeField& field) {
     PlaneSums sums;
     for (size_t k = 0; k < stations.size(); ++k) {
       const SurfacePatch& patch = stations[k].side[side];
-      if (patch.terms != 0 && patch.rms_r <= 1.5 * usual) sums.add(sums_[2 * k + side]);
+      if (patch.terms != 0 && patch.rms_footprints <= 1.5 * usual) sums.add(sums_[2 * k + side]);
     }
     const CurveStation& centre = stations[stations.size() / 2];
     const SurfacePatch whole = sums.solve(focal_px(field.intrinsics), centre.x, centre.y);
-    if (whole.terms == 0 || whole.rms_r > usual) continue;
+    if (whole.terms == 0 || whole.rms_footprints > usual) continue;
     whole_side[side] = whole;
     for (CurveStation& s : stations) {
       s.side[side] = whole;
@@ -265,7 +267,7 @@ void CurveStations::measure_field_gaps(const EdgeField& field) {
 }
 
 // A crease where both surfaces reach the edge at one depth and the field does not say boundary; else the boundary of
-// the nearer one. What the field falls to 0 on one side of belongs to that side.
+// the nearer one. An edge at which the field falls to 0 on one side belongs to that side.
 void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed) {
   const auto n = int(stations.size());
   measure_field_gaps(field);
@@ -386,7 +388,7 @@ void CurveStations::move_across(const EdgeField& field) {
                  const double predicted = length(cross(to, along)) * q_here * focal;
                  const double slope = predicted / across, off = (predicted - value) / (kBelief_px * slope);
                  if (predicted > max_r || !(std::abs(off) < 1)) return;
-                 const double spread = field.spread_r[at], robust = (1 - off * off) * (1 - off * off);
+                 const double spread = field.expected_error_r[at], robust = (1 - off * off) * (1 - off * off);
                  const double w = robust * slope * slope / (1 + spread * spread);
                  if (!(w > 0)) return;
                  weight += w;

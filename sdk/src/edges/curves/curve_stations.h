@@ -1,4 +1,4 @@
-// Places along one chain at which an edge is measured: where it is across, from the field; how far away, from the
+// Stations along one chain at which an edge is measured: its position across from the field, its depth from the
 // surfaces on either side.
 #pragma once
 
@@ -11,14 +11,14 @@
 
 namespace maq {
 
-inline constexpr double kLongestStep_r = 6;  // of a pixel along a curve that runs away from the camera
+inline constexpr double kLongestStep_r = 6;  // length of a pixel along a curve that runs away from the camera
 
 struct CurveStation {
-  double x, y, tx, ty;   // px: the edge, and its direction in the picture; to its left is (ty, -tx), side 0
-  double across_weight;  // one over the variance of its place across the edge, 1/px^2
+  double x, y, tx, ty;   // px: the edge, and its direction in the image; side 0 is on its left, at (ty, -tx)
+  double across_weight;  // inverse variance of the position across the edge, 1/px^2
   std::array<SurfacePatch, 2> side;
   bool is_boundary;
-  int near_side;                      // the one side that the edge is the end of; -1: both
+  int near_side;                      // the side that ends at the edge; -1: both
   double gap_r;                       // of side 1 behind side 0 along the ray
   double field_gap_px;                // by how much farther away the field has an edge on side 1 than on side 0
   std::array<int, 2> boundary_votes;  // pixels of the field near it that say boundary, less those that say crease
@@ -38,11 +38,11 @@ class CurveStations {
  public:
   std::vector<CurveStation> stations;
   std::vector<StationRun> runs;  // in turn; stations between them are of no edge
-  bool is_straight = false;      // in the picture
-  // Of a straight chain whose sides are planes all along.
+  bool is_straight = false;      // in the image
+  // The sides of a straight chain, if they are planes along its whole length.
   std::array<SurfacePatch, 2> whole_side;
 
-  // False where no surface is known beside the chain.
+  // Returns false if no surface is known beside the chain.
   bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain, const CurveOptions& options);
 
   // After measure(): two edges, one behind the other, are one chain. Stations and runs become those of the farther one;
@@ -51,7 +51,7 @@ class CurveStations {
 
  private:
   void place(const RidgePoint* points, const RidgeChain& chain);
-  // Pixels beside a station, every so many along and across.
+  // The pixels beside a station, sampled along and across the edge.
   struct Band {
     int side;
     double half_window_px, to_px;

@@ -8,7 +8,7 @@
 
 namespace maq {
 
-// A point with the length in which its distance from a curve is measured: 1 r at its place.
+// A point with its unit of distance from a curve: one footprint r.
 struct FitPoint {
   Vec3 point;
   double unit_m = 1;
@@ -16,15 +16,15 @@ struct FitPoint {
 };
 
 struct LineFit {
-  Vec3 from, to;   // the feet of the outermost points, onward from the first point to the last
+  Vec3 from, to;   // the feet of the outermost points, in the direction from the first point to the last
   double rms = 0;  // units
 };
 
-// By least squares with a robust weight. Nothing where the points are one place, or not finite. Their order matters to
-// the line's direction alone.
+// Fits by least squares with a robust weight. Returns nothing for points that coincide or are not finite. Their order
+// affects only the direction of the line.
 std::optional<LineFit> fit_line(const FitPoint* points, size_t count);
 
-// Nothing tells points within this fraction of their size from one place or one line: the rounding of float depth.
+// Points within this fraction of their size count as one point or one line: the rounding of float depth.
 inline constexpr double kFitRounding = 1e-7;
 
 }  // namespace maq

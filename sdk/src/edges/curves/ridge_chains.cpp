@@ -151,7 +151,7 @@ void RidgeChains::part_at_turns(RidgeChain chain, const CurveOptions& options, C
   const int n = chain.count;
   const RidgePoint* p = points.data() + chain.first;
   turns_.assign(size_t(n), 0.0f);
-  const double least = double(options.break_deg) * (3.14159265358979 / 180);
+  const double least = double(options.split_angle_deg) * (3.14159265358979 / 180);
   for (int i = 4 + kRounded; i + 4 + kRounded < n; ++i) {
     const int before = std::min(i - kRounded, kWindow), after = std::min(n - 1 - i - kRounded, kWindow);
     const RidgePoint *head = p + i - kRounded - before, *tail = p + i + kRounded + 1;

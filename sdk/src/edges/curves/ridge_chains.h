@@ -1,4 +1,4 @@
-// The crests of the votes as chains of points, and those chains parted where they turn sharply.
+// Chains of points along the crests of the votes, split where they turn sharply.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct RidgeChains {
   std::vector<RidgePoint> points;
   std::vector<RidgeChain> chains;
 
-  // The same for the same votes; each pixel is in one chain.
+  // Deterministic: the same votes give the same chains. Each pixel is in one chain.
   void trace(const RidgeVotes& votes, const CurveOptions& options, CurveCounts& counts);
 
  private:

@@ -9,12 +9,12 @@ namespace {
 constexpr int kGradientRadius_px = 2;  // gradients are of 5x5 pixels
 
 // On one surface the field cannot change faster than this between neighbouring pixels, in r, unless it is seen at a
-// grazing angle: what changes faster is another surface.
+// grazing angle: a faster change means another surface.
 constexpr float kSteepest = 4;
 
 constexpr float kJump_r = 6;
 
-// What smoothing leaves of the votes on a crest, which are spread over two pixels before: between 0.25 and 0.375.
+// The share of the votes that smoothing leaves on a crest. They are spread over two pixels before: 0.25 to 0.375.
 constexpr float kCrest = 0.3f;
 
 struct Gradient {
@@ -22,7 +22,7 @@ struct Gradient {
   bool is_known = false;
 };
 
-// By least squares over the pixels around (x, y) that lie on its surface, as far as the field tells.
+// Fits the gradient by least squares to the pixels around (x, y) that lie on the same surface according to the field.
 Gradient gradient_at(const EdgeField& field, int x, int y) {
   const float here = field.distance_r[size_t(y) * size_t(field.width) + size_t(x)];
   float n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sd = 0, sxd = 0, syd = 0;
@@ -66,7 +66,7 @@ void smooth(std::vector<float>& plane, int width, int height, std::vector<float>
   }
 }
 
-// Beside a jump of the field a surface ends, and what made the field may have mixed both sides.
+// A surface ends beside a jump of the field, and the network may have mixed both sides there.
 bool is_at_jump(const EdgeField& field, int x, int y) {
   const size_t at = size_t(y) * size_t(field.width) + size_t(x), row = size_t(field.width);
   const float most = field.distance_r[at] + kJump_r;
@@ -74,7 +74,7 @@ bool is_at_jump(const EdgeField& field, int x, int y) {
          (y > 0 && field.distance_r[at - row] > most) || (y + 1 < field.height && field.distance_r[at + row] > most);
 }
 
-// Less than the slope can be, in r for each pixel, from the pixels beside: what cannot be near enough is left out.
+// A lower bound of the slope, in r for each pixel, from neighbouring pixels: pixels that are too far are left out.
 float quick_slope(const EdgeField& field, int x, int y) {
   const size_t at = size_t(y) * size_t(field.width) + size_t(x), row = size_t(field.width);
   const auto& d = field.distance_r;
@@ -85,7 +85,7 @@ float quick_slope(const EdgeField& field, int x, int y) {
 
 }  // namespace
 
-void RidgeVotes::gather(const EdgeField& field, float select_px, CurveCounts& counts) {
+void RidgeVotes::gather(const EdgeField& field, float vote_radius_px, CurveCounts& counts) {
   width = field.width, height = field.height;
   const size_t pixels = size_t(width) * size_t(height);
   for (auto* plane : {&weight, &cos2, &sin2}) plane->assign(pixels, 0.0f);
@@ -97,18 +97,20 @@ void RidgeVotes::gather(const EdgeField& field, float select_px, CurveCounts& co
         ++counts.bad_pixels;
         continue;
       }
-      if (distance >= field.eps_r || distance > select_px * std::max(1.0f, 1.2f * quick_slope(field, x, y))) continue;
+      if (distance >= field.eps_r || distance > vote_radius_px * std::max(1.0f, 1.2f * quick_slope(field, x, y)))
+        continue;
       const Gradient g = gradient_at(field, x, y);
       const float slope = std::hypot(g.x, g.y);
       // A pixel is at least one r wide, so a smaller slope is that of a ridge within the window. On the ridge itself
-      // both sides cancel. A field without a slope says nothing.
+      // both sides cancel. A field without a slope casts no vote.
       const float step_px = distance / std::max(slope, 1.0f);
-      if (!g.is_known || !(slope > 0.25f) || step_px > select_px || is_at_jump(field, x, y)) continue;
+      if (!g.is_known || !(slope > 0.25f) || step_px > vote_radius_px || is_at_jump(field, x, y)) continue;
       ++counts.voting_pixels;
       const float to_x = float(x) - g.x * step_px / slope, to_y = float(y) - g.y * step_px / slope;
       const auto left = int(std::floor(to_x)), top = int(std::floor(to_y));
       if (left < 0 || top < 0 || left + 1 >= width || top + 1 >= height) continue;
-      const float spread = field.spread_r[at], vote = 1 / (select_px * kCrest * (1 + 0.25f * spread * spread));
+      const float spread = field.expected_error_r[at],
+                  vote = 1 / (vote_radius_px * kCrest * (1 + 0.25f * spread * spread));
       if (!(vote > 0)) continue;
       const float fx = to_x - float(left), fy = to_y - float(top);
       const float c2 = (g.x * g.x - g.y * g.y) / (slope * slope), s2 = 2 * g.x * g.y / (slope * slope);

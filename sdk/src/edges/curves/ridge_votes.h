@@ -1,4 +1,4 @@
-// Where the pixels near an edge say that it is: each votes for the place its distance down the field's gradient.
+// Votes of the pixels near an edge for its position: its distance away, down the gradient of the field.
 #pragma once
 
 #include <vector>
@@ -15,7 +15,7 @@ struct RidgeVotes {
   std::vector<float> cos2, sin2;  // weight * double angle of the direction across the edge
   std::vector<float> scratch;     // a row each of the smoothing
 
-  void gather(const EdgeField& field, float select_px, CurveCounts& counts);
+  void gather(const EdgeField& field, float vote_radius_px, CurveCounts& counts);
 };
 
 }  // namespace maq

@@ -8,7 +8,8 @@
 namespace maq {
 namespace {
 
-constexpr double kStiffness = 1e-4;  // of second differences of control points: they stay between the points
+constexpr double kStiffness =
+    1e-4;  // weight of second differences of control points, which keeps them between the points
 
 struct Basis {
   int first;
@@ -61,7 +62,8 @@ Vec3 spline_point(const Vec3* controls, int count, double t) {
 bool SplineFitter::solve(const FitPoint* points, size_t count, int control_count, bool is_closed) {
   constexpr int kStride = kMaxSplineControls;
   double a[kStride * kStride] = {}, b[kStride * 3] = {};
-  const int unknowns = is_closed ? control_count - 1 : control_count;  // a closed one's last control is its first
+  const int unknowns =
+      is_closed ? control_count - 1 : control_count;  // the last control of a closed curve is its first
   const auto add = [&](const int* index, const double* value, int terms, double w, Vec3 target) {
     for (int i = 0; i < terms; ++i) {
       const int row = index[i] % unknowns;
@@ -101,7 +103,7 @@ std::optional<double> SplineFitter::fit(const FitPoint* points, size_t count, bo
   std::optional<double> best;
   const int most = std::min(kMaxSplineControls, int(count));
   for (int controls = std::min(is_closed ? 7 : 4, most); controls <= most; ++controls) {
-    // By the length of the chords between points.
+    // Parameters follow the length of the chords between points.
     parameters_.assign(count, 0);
     double sum = 0;
     for (size_t i = 1; i < count; ++i) parameters_[i] = sum += length(points[i].point - points[i - 1].point);
@@ -122,7 +124,7 @@ std::optional<double> SplineFitter::fit(const FitPoint* points, size_t count, bo
         off_[i] = length(across) / points[i].unit_m;
         squares += points[i].weight * off_[i] * off_[i];
         weights += points[i].weight;
-        // The first and the last stay the ends.
+        // The first and the last point stay the ends.
         if (i > 0 && i + 1 < count)
           parameters_[i] = std::clamp(parameters_[i] + std::clamp(along, -0.02, 0.02), 0.0, 1.0);
       }

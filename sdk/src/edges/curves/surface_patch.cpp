@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-constexpr double kMinSigma_r = 0.02;  // float depth and what is not quite flat: better is not believed
+constexpr double kMinSigma_r = 0.02;  // lower limit: rounding of float depth, surfaces that are not quite flat
 
 void polynomial(double u, double v, int terms, double* out) {
   out[0] = 1, out[1] = u, out[2] = v;
@@ -35,7 +35,7 @@ SurfacePatch solve_patch(const std::vector<BandPixel>& pixels, double x, double 
     weight += w;
     squares += w * value * value;
   }
-  b[1] = 1;  // a second system, whose answer is the variance at the place itself
+  b[1] = 1;  // a second system: its solution is the variance at the point itself
   double fitted = 0;
   double right[6];
   for (int i = 0; i < terms; ++i) right[i] = b[2 * i];
@@ -44,8 +44,8 @@ SurfacePatch solve_patch(const std::vector<BandPixel>& pixels, double x, double 
   patch.x = x, patch.y = y;
   patch.terms = terms;
   for (int i = 0; i < terms; ++i) patch.coefficient[size_t(i)] = unit * (b[2 * i] + (i == 0 ? 1 : 0));
-  patch.rms_r = focal_px * std::sqrt(std::max(0.0, squares - fitted) / weight);
-  patch.edge_sigma_r = std::max(patch.rms_r, kMinSigma_r) * std::sqrt(std::max(0.0, b[1]));
+  patch.rms_footprints = focal_px * std::sqrt(std::max(0.0, squares - fitted) / weight);
+  patch.edge_sigma_r = std::max(patch.rms_footprints, kMinSigma_r) * std::sqrt(std::max(0.0, b[1]));
   if (!(patch.coefficient[0] > 0.2 * unit && patch.coefficient[0] < 5 * unit)) patch.terms = 0;
   return patch;
 }
@@ -101,9 +101,9 @@ SurfacePatch PlaneSums::solve(double focal_px, double edge_x, double edge_y) con
   patch.terms = 3;
   for (size_t i = 0; i < 3; ++i) patch.coefficient[i] = unit * (right[2 * i] + (i == 0 ? 1 : 0));
   const double fitted = right[0] * b[0] + right[2] * b[1] + right[4] * b[2];
-  patch.rms_r = focal_px * std::sqrt(std::max(0.0, squares - fitted) / weight);
+  patch.rms_footprints = focal_px * std::sqrt(std::max(0.0, squares - fitted) / weight);
   const double variance = right[1] + u * right[3] + v * right[5];
-  patch.edge_sigma_r = std::max(patch.rms_r, kMinSigma_r) * std::sqrt(std::max(0.0, variance));
+  patch.edge_sigma_r = std::max(patch.rms_footprints, kMinSigma_r) * std::sqrt(std::max(0.0, variance));
   return patch;
 }
 
@@ -123,7 +123,7 @@ SurfacePatch PatchFitter::fit(std::vector<BandPixel>& pixels, double x, double y
     SurfacePatch patch = solve_patch(pixels, x, y, focal_px, terms);
     for (int round = 0; round < 3 && patch.terms != 0; ++round) {
       const double scale = 2 * scale_of_residuals(pixels, patch, focal_px);
-      if (scale <= 2 * kMinSigma_r && patch.rms_r <= kMinSigma_r) break;
+      if (scale <= 2 * kMinSigma_r && patch.rms_footprints <= kMinSigma_r) break;
       for (BandPixel& pixel : pixels) {
         const double ratio = residual_r(pixel, patch, focal_px) / scale;
         pixel.weight = 1 / ((1 + ratio * ratio) * (1 + ratio * ratio));
@@ -132,9 +132,9 @@ SurfacePatch PatchFitter::fit(std::vector<BandPixel>& pixels, double x, double y
     }
     if (terms == 3) {
       best = patch;
-      // Flat as far as can be told, or a plane is all that the pixels allow.
-      if (!may_bend || (best.terms != 0 && best.rms_r < 2 * kMinSigma_r)) break;
-    } else if (patch.terms != 0 && (best.terms == 0 || patch.rms_r < 0.5 * best.rms_r)) {
+      // The surface is flat within its noise, or the pixels determine only a plane.
+      if (!may_bend || (best.terms != 0 && best.rms_footprints < 2 * kMinSigma_r)) break;
+    } else if (patch.terms != 0 && (best.terms == 0 || patch.rms_footprints < 0.5 * best.rms_footprints)) {
       best = patch;
     }
   }

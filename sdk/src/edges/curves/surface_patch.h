@@ -1,4 +1,4 @@
-// The surface beside an edge: inverse depth as a polynomial of the pixel, fitted beyond where depth smears.
+// The surface beside an edge: inverse depth as a polynomial of the pixel, fitted beyond the band of flying pixels.
 #pragma once
 
 #include <array>
@@ -8,12 +8,12 @@
 
 namespace maq {
 
-// The inverse depth of a plane is linear in the pixel, whatever its tilt; a patch that bends has squares as well.
+// The inverse depth of a plane is linear in the pixel for any tilt. A curved patch also has squares.
 struct SurfacePatch {
   int terms = 0;                        // 0: no surface is known, 3: a plane, 6: with squares
   double x = 0, y = 0;                  // px: the place around which it was fitted
   std::array<double, 6> coefficient{};  // of 1, u, v, uu, uv, vv with u, v = (pixel - place) / kPatchScale_px; 1/m
-  double rms_r = 0;                     // of the pixels' depth from it, along the ray
+  double rms_footprints = 0;            // of the pixels' depth from it, along the ray
   double edge_sigma_r = 0;              // of its depth at (x, y), along the ray
 
   double inverse_depth(double at_x, double at_y) const;
@@ -40,14 +40,14 @@ struct PlaneSums {
   void begin(double at_x, double at_y, double inverse_depth);
   void add(const BandPixel& pixel);
   void add(const PlaneSums& other);  // of the same place
-  // terms = 0 where they do not determine a plane. `edge`: the place for edge_sigma_r.
+  // Returns terms = 0 if the sums do not determine a plane. `edge`: the point for edge_sigma_r.
   SurfacePatch solve(double focal_px, double edge_x, double edge_y) const;
 };
 
 class PatchFitter {
  public:
-  // A plane, or where `may_bend` a patch with squares if that is much nearer to the pixels, with a robust weight: some
-  // of them may be of another surface. On return pixels have those weights.
+  // Fits a plane with a robust weight, because some pixels may belong to another surface. With `may_bend`, fits a patch
+  // with squares if it is much nearer to the pixels. Sets the weights of the pixels.
   SurfacePatch fit(std::vector<BandPixel>& pixels, double x, double y, double focal_px, bool may_bend);
 
  private:
@@ -56,7 +56,7 @@ class PatchFitter {
   std::vector<double> residuals_;
 };
 
-// The plane of a patch of three terms, in camera coordinates.
+// Returns the plane of a patch of three terms, in camera coordinates.
 Plane plane_of(const SurfacePatch& patch, const Intrinsics& camera);
 
 }  // namespace maq

@@ -51,7 +51,7 @@ std::string curves_as_ply(const EdgeCurves& curves) {
   return text.str();
 }
 
-// Release 12 has neither arcs nor splines in space: they are polylines. Entities alone are a whole file.
+// Release 12 has no arcs or splines in space: they become polylines. Entities alone make a complete file.
 std::string curves_as_dxf(const EdgeCurves& curves) {
   std::ostringstream text = text_of_numbers();
   text << "0\nSECTION\n2\nENTITIES\n";

@@ -1,4 +1,4 @@
-// Curves as files (docs/formats.md).
+// Curves as files (docs/reference/formats.md).
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace maq {
 
-// Writes .json, .obj, .ply, .dxf or .step (.stp), by the ending of `path` in small letters; it appears atomically.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for another ending, and what AtomicFile throws.
+// Writes .json, .obj, .ply, .dxf or .step (.stp) by the extension of `path`, in small letters. The file appears
+// atomically. Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, and the errors of AtomicFile.
 void write_curve_file(const EdgeCurves& curves, const std::string& path);
 
-// What each has written in it.
+// Return the content of each format.
 std::string curves_as_obj(const EdgeCurves& curves);
 std::string curves_as_ply(const EdgeCurves& curves);
 std::string curves_as_dxf(const EdgeCurves& curves);

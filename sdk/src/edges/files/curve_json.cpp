@@ -11,7 +11,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kVersion = 1;
-constexpr size_t kBytesOfCurve = 4096, kBytesOfPoint = 512;  // what the document takes in memory, at most
+constexpr size_t kBytesOfCurve = 4096, kBytesOfPoint = 512;  // upper limits of the document's memory
 
 Json json_of(Vec3 p) { return {p.x, p.y, p.z}; }
 
@@ -24,12 +24,12 @@ Json json_of(const std::vector<Vec3>& points, int first, int count) {
 Json json_of(const EdgeCurves& curves, const EdgeCurve& curve) {
   Json made;
   made["kind"] = name_of(curve.kind);
-  made["bend"] = name_of(curve.bend);
+  made["bend"] = name_of(curve.convexity);
   made["type"] = name_of(curve.type);
   made["closed"] = curve.is_closed;
   made["corners"] = curve.corner;
   made["length_m"] = curve.length_m;
-  made["rms_r"] = curve.rms_r;
+  made["rms_r"] = curve.rms_footprints;
   if (curve.type == CurveType::kArc) {
     made["centre"] = json_of(curve.centre);
     made["x_axis"] = json_of(curve.x_axis);
@@ -55,8 +55,8 @@ Json json_of(const EdgeCurves& curves, const EdgeCurve& curve) {
 
 const char* name_of(EdgeKind kind) { return kind == kBoundaryEdge ? "boundary" : "crease"; }
 
-const char* name_of(Bend bend) {
-  return bend == Bend::kConvex ? "convex" : bend == Bend::kConcave ? "concave" : "unknown";
+const char* name_of(Convexity convexity) {
+  return convexity == Convexity::kConvex ? "convex" : convexity == Convexity::kConcave ? "concave" : "unknown";
 }
 
 const char* name_of(CurveType type) {
@@ -64,7 +64,7 @@ const char* name_of(CurveType type) {
 }
 
 std::string curves_as_json(const EdgeCurves& curves) {
-  // Where a few bytes fail, the JSON library ends the process.
+  // The JSON library ends the process when an allocation fails.
   require_memory(kBytesOfCurve * (1 + curves.curves.size() + curves.corners.size()) +
                  kBytesOfPoint * (curves.points.size() + curves.controls.size()));
   Json document;

@@ -1,4 +1,4 @@
-// The JSON of curves (docs/formats.md): every parameter, so that nothing has to be fitted again.
+// The JSON of curves (docs/reference/formats.md): all parameters, so that no reader has to fit again.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ std::string curves_as_json(const EdgeCurves& curves);
 
 // "crease" or "boundary"; "convex", "concave" or "unknown"; "line", "arc" or "spline".
 const char* name_of(EdgeKind kind);
-const char* name_of(Bend bend);
+const char* name_of(Convexity convexity);
 const char* name_of(CurveType type);
 
 }  // namespace maq

@@ -6,7 +6,7 @@ namespace maq {
 
 std::ostringstream text_of_numbers() {
   std::ostringstream text;
-  text.exceptions(std::ios::badbit);  // what throws without memory, where the text would end early
+  text.exceptions(std::ios::badbit);  // throws without memory; otherwise the text would end early
   text.imbue(std::locale::classic());
   text.precision(9);
   return text;
@@ -18,8 +18,8 @@ std::string axes_of(const EdgeCurves& curves) {
 
 std::string layer_of(const EdgeCurve& curve) {
   std::string name = curve.kind == kBoundaryEdge ? "BOUNDARY" : "CREASE";
-  if (curve.bend == Bend::kConvex) name += "_CONVEX";
-  if (curve.bend == Bend::kConcave) name += "_CONCAVE";
+  if (curve.convexity == Convexity::kConvex) name += "_CONVEX";
+  if (curve.convexity == Convexity::kConcave) name += "_CONCAVE";
   return name;
 }
 

@@ -1,4 +1,4 @@
-// What all text files of curves have in common.
+// Common parts of the text files of curves.
 #pragma once
 
 #include <sstream>
@@ -8,13 +8,13 @@
 
 namespace maq {
 
-// Numbers of 9 digits with a point, whatever the app's locale.
+// Writes numbers with 9 digits and a point in any locale.
 std::ostringstream text_of_numbers();
 
-// What the coordinates of curves mean.
+// Returns the meaning of the coordinates in words.
 std::string axes_of(const EdgeCurves& curves);
 
-// The layer or group of a curve: its kind, and of a crease its bend where that is known.
+// Returns the layer or group of a curve: its kind, and for a crease its convexity if known.
 std::string layer_of(const EdgeCurve& curve);
 
 }  // namespace maq

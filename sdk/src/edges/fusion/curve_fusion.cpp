@@ -11,11 +11,11 @@
 namespace maq {
 namespace {
 
-constexpr double kPlaceStep_r = 1;  // between the places of a curve
-constexpr int kMaxSteps = 20000;    // along one curve, and as many when it is made longer
+constexpr double kPlaceStep_r = 1;  // distance between samples of a curve
+constexpr int kMaxSteps = 20000;    // along one curve, and as many for its extension
 constexpr double kTurn_rad = 6.283185307179586;
-constexpr double kBeside = 1.3;  // of match_r: so near a fused curve nothing else is another one
-// A crease in a quarter of what was seen of a curve is one: for the rest one side was hidden.
+constexpr double kBeside = 1.3;  // times match_r: other pieces this near a fused curve belong to it
+// A curve is a crease if a quarter of its samples are: in the rest one side was hidden.
 constexpr double kCreaseFraction = 0.25;
 
 Vec3 in_world(const PinholeCamera& camera, Vec3 d) {
@@ -45,7 +45,7 @@ void CurveFusion::add_view(const EdgeCurves& curves, const PinholeCamera& pose) 
         const Vec3 p = a + ((k + 0.5) / steps) * d;
         if (!is_finite(p) || !(p.z > 0)) continue;
         places_.push_back(
-            {in_world(pose, p), in_world(pose, normalized(d)), p.z / focal, view, curve.kind, curve.bend});
+            {in_world(pose, p), in_world(pose, normalized(d)), p.z / focal, view, curve.kind, curve.convexity});
       }
       piece.length_r += size_r;
     }
@@ -54,7 +54,7 @@ void CurveFusion::add_view(const EdgeCurves& curves, const PinholeCamera& pose) 
   }
 }
 
-// The work of one fusion: pieces in turn, the longest first; each takes with it what other views have beside it.
+// The work of one fusion: pieces one by one, the longest first. Each piece absorbs pieces of other views beside it.
 class CurveFusion::Merger {
  public:
   Merger(const CurveFusion& from, const std::array<double, 3>& origin, EdgeCurves& result)
@@ -74,7 +74,7 @@ class CurveFusion::Merger {
     for (size_t i = 0; i < places_.size(); ++i) cells_[key_of(places_[i].point)].push_back(i);
     is_taken_.assign(places_.size(), 0);
     round_of_.assign(places_.size(), 0);
-    // What comes first decides, and must not depend on the order of views.
+    // The order of pieces matters, so it must not depend on the order of views.
     std::sort(pieces_.begin(), pieces_.end(), [&](const Piece& a, const Piece& b) {
       if (a.length_r != b.length_r) return a.length_r > b.length_r;
       const Vec3 p = places_[a.first].point, q = places_[b.first].point;
@@ -186,19 +186,20 @@ class CurveFusion::Merger {
       is_taken_[found.place] = 1;
       views.insert(place.view);
       creases += place.kind == kCreaseEdge ? 1 : 0;
-      convex += place.bend == Bend::kConvex ? 1 : 0;
-      concave += place.bend == Bend::kConcave ? 1 : 0;
+      convex += place.convexity == Convexity::kConvex ? 1 : 0;
+      concave += place.convexity == Convexity::kConcave ? 1 : 0;
     }
     for (size_t i = first; i < end; ++i) is_taken_[i] = 1;
     for (const size_t i : beside_) is_taken_[i] = 1;
     if (int(views.size()) < min_views_) return;
     EdgeCurve& curve = draft.curve;
     curve.kind = double(creases) >= kCreaseFraction * double(found_.size()) ? kCreaseEdge : kBoundaryEdge;
-    if (curve.kind == kCreaseEdge && convex != concave) curve.bend = convex > concave ? Bend::kConvex : Bend::kConcave;
+    if (curve.kind == kCreaseEdge && convex != concave)
+      curve.convexity = convex > concave ? Convexity::kConvex : Convexity::kConcave;
     drafts_.push_back(draft);
   }
 
-  // What lies along a curve that was found, a little farther beside it than what it was made of.
+  // Absorbs pieces along a fused curve, within a slightly larger distance than its own samples.
   template <class At>
   void note_beside(At at, double length_m, double r_m) {
     beside_.clear();
@@ -231,7 +232,7 @@ class CurveFusion::Merger {
     if (!(high - low >= options_.min_length_r * draft.r_m)) return false;
     draft.outward = {-direction, direction};
     draft.curve.type = CurveType::kLine;
-    draft.curve.rms_r = line->rms;
+    draft.curve.rms_footprints = line->rms;
     const Vec3 from = line->from;
     note_beside([&](double s) { return Spot{from + s * direction, direction}; }, length(line->to - from), draft.r_m);
     return true;
@@ -277,7 +278,7 @@ class CurveFusion::Merger {
     curve.centre = arc->centre, curve.x_axis = arc->x_axis, curve.y_axis = arc->y_axis;
     curve.is_closed = (kTurn_rad - arc->sweep_rad) * radius < options_.gap_r * draft.r_m;
     curve.sweep_rad = curve.is_closed ? kTurn_rad : arc->sweep_rad;
-    curve.rms_r = arc->rms;
+    curve.rms_footprints = arc->rms;
     if (!(curve.sweep_rad * radius >= options_.min_length_r * draft.r_m)) return restore(first, end);
     const auto spot = [&](double s) {
       const double a = s / radius;
@@ -312,7 +313,7 @@ class CurveFusion::Merger {
     const std::vector<Vec3>& controls = spline_fitter_.controls();
     EdgeCurve& curve = draft.curve;
     curve.type = CurveType::kSpline;
-    curve.rms_r = *rms;
+    curve.rms_footprints = *rms;
     curve.first_control = int(result_.controls.size());
     curve.control_count = int(controls.size());
     result_.controls.insert(result_.controls.end(), controls.begin(), controls.end());

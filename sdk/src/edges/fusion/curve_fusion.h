@@ -1,4 +1,4 @@
-// Sharp feature curves of several posed views as one set: what lies side by side in space is one curve.
+// Fuses sharp feature curves of several posed views: curves side by side in space become one.
 #pragma once
 
 #include <array>
@@ -16,21 +16,21 @@ namespace maq {
 
 // r: a footprint of the view that saw a curve.
 struct CurveFusionOptions {
-  double match_r = 3;        // curves of two views are one where they are so near
-  double match_deg = 20;     // and run the same way
-  double gap_r = 6;          // a curve goes on over gaps of so much
-  double tolerance_r = 1;    // the simplest type is taken that is so near its points (root of the mean square)
-  double min_length_r = 10;  // shorter curves are left out
-  double join_r = 12;        // ends so near the place where their curves meet share a corner
-  int min_views = 2;         // that saw a curve, or it is left out; of two views and fewer, one is enough
-  int max_curves = 4096;     // more are left out, the shortest
+  double match_r = 3;        // curves of two views are one if they are this near
+  double match_deg = 20;     // and have this direction in common
+  double gap_r = 6;          // a curve continues over gaps of this length
+  double tolerance_r = 1;    // the simplest type with this root mean square distance is taken
+  double min_length_r = 10;  // shorter curves are dropped
+  double join_r = 12;        // ends this near the point where their curves meet share a corner
+  int min_views = 2;         // views a curve needs; with one or two views, one is enough
+  int max_curves = 4096;     // the shortest beyond this number are dropped
 };
 
 class CurveFusion {
  public:
   explicit CurveFusion(const CurveFusionOptions& options = {}) : options_(options) {}
 
-  // Curves of a view, in the coordinates of its camera.
+  // Adds the curves of a view, in the coordinates of its camera.
   void add_view(const EdgeCurves& curves, const PinholeCamera& pose);
 
   // Curves of all views, in the world; what is computed is computed from `origin`, which is amid the cameras. The order
@@ -38,13 +38,13 @@ class CurveFusion {
   void fuse(const std::array<double, 3>& origin, EdgeCurves& result) const;
 
  private:
-  // A place on a view's curve; the direction has length 1.
+  // A sample of a view's curve; the direction has length 1.
   struct Place {
     Vec3 point, direction;
     double r_m;
     int view;
     EdgeKind kind;
-    Bend bend;
+    Convexity convexity;
   };
   struct Piece {
     size_t first, count;  // of places_

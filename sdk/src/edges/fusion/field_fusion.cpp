@@ -11,10 +11,10 @@
 namespace maq {
 namespace {
 
-constexpr double kFacing = 0.1;  // cosine between a surface and the way to a camera that sees it, at least
-constexpr double kMixed = 0.3;   // length of the mean normal of a cell, at least
+constexpr double kFacing = 0.1;  // minimum cosine between a surface and the direction to a camera that sees it
+constexpr double kMixed = 0.3;   // minimum length of the mean normal of a cell
 constexpr int64_t kPointsOfTask = 2048;
-constexpr float kFractionOfGrid = 0.3f;  // of the time
+constexpr float kFractionOfGrid = 0.3f;  // share of the time
 
 template <class Value>
 Value median_of(std::vector<Value> values) {
@@ -32,7 +32,7 @@ void check_field(const EdgeField& field) {
   }
 }
 
-// Smaller halves, because a view from which an edge is hidden says too much, and none says too little but by mistake.
+// The smaller half, because a view in which an edge is hidden gives too large a distance. Too small ones are errors.
 double mean_of_smaller_half(std::vector<double>& values) {
   const size_t count = (values.size() + 1) / 2;
   std::sort(values.begin(), values.end());

@@ -16,37 +16,37 @@
 namespace maq {
 
 struct FusionOptions {
-  double cell_m = 0;               // of the grid of points; 0: the median footprint of the views
-  double reach_r = 6;              // a view saw a point when pixels about it are so near
-  int64_t max_pixels = 1 << 25;    // of all views, six bytes each
-  int64_t max_points = 4'000'000;  // of the result, some 110 bytes each while it is made
+  double cell_m = 0;               // size of a grid cell; 0: the median footprint of the views
+  double reach_r = 6;              // a view saw a point if the pixels around it are this near
+  int64_t max_pixels = 1 << 25;    // limit for all views, six bytes each
+  int64_t max_points = 4'000'000;  // limit for the result, about 110 bytes each during fusion
 };
 
 struct FusedPoint {
   Vec3 point;         // from FusedField::origin
-  Vec3 normal;        // of length 1, towards the cameras that saw it
+  Vec3 normal;        // length 1, towards the cameras that saw the point
   float distance_m;   // to the nearest sharp curve that a view sees, at most eps_r * r_m
-  float r_m;          // the smallest footprint in which a view saw it
-  int32_t views = 0;  // how many saw it
+  float r_m;          // the smallest footprint in which a view saw the point
+  int32_t views = 0;  // number of views that saw the point
 };
 
 struct FusedField {
   std::array<double, 3> origin{};  // in the world, amid the cameras
   double cell_m = 0;
   float eps_r = 0;
-  std::vector<FusedPoint> points;  // in the order of their places; the order of views has no effect
-  int64_t outside_pixels = 0;      // a million cells and more from the origin
-  int64_t mixed_points = 0;        // left out: both sides of something thin are in one cell
+  std::vector<FusedPoint> points;  // sorted by position; the order of views has no effect
+  int64_t outside_pixels = 0;      // dropped: more than a million cells from the origin
+  int64_t mixed_points = 0;        // dropped: surfaces thinner than one cell
 };
 
 class FieldFusion {
  public:
-  // Throws MAQ_ERROR_INVALID_ARGUMENT where an option is not in its range.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for an option out of range.
   explicit FieldFusion(const FusionOptions& options = {});
 
-  // Keeps a view's field; `pose` is the camera that took it. One without known depth counts, but is not kept. Throws
-  // MAQ_ERROR_INVALID_ARGUMENT for a field whose planes have not its size, an eps_r other than that of the views
-  // before, and what check_camera() throws; MAQ_ERROR_UNSUPPORTED where the views have more pixels than max_pixels.
+  // Keeps the field of a view; `pose` is its camera. A view without known depth is counted, but not kept. Throws
+  // MAQ_ERROR_INVALID_ARGUMENT for planes of another size and for an eps_r that differs from earlier views, the errors
+  // of check_camera(), and MAQ_ERROR_UNSUPPORTED if all views have more pixels than max_pixels.
   void add_view(const EdgeField& field, const PinholeCamera& pose);
 
   int views() const { return views_; }
@@ -54,9 +54,9 @@ class FieldFusion {
   const std::vector<FusionView>& kept() const { return kept_; }
 
   using Progress = std::function<void(float share)>;
-  // Points of all views, one a cell of the grid, each with what the views that see it say: the mean of the smaller half
-  // of their distances. Views and options stay, so that more can be added. `progress` is called by this thread. Throws
-  // MAQ_CANCELLED where `is_cancelled` gets true, MAQ_ERROR_UNSUPPORTED for more than max_points.
+  // Computes the points of all views, one for each grid cell. The distance of a point is the mean of the smaller half
+  // of the distances from the views that see it. More views can be added afterwards. Calls `progress` on this thread.
+  // Throws MAQ_CANCELLED once `is_cancelled` is true, MAQ_ERROR_UNSUPPORTED for more than max_points.
   void fuse(WorkerThreads& threads, const std::atomic<bool>& is_cancelled, const Progress& progress,
             FusedField& result) const;
 

@@ -8,11 +8,11 @@
 namespace maq {
 namespace {
 
-// Along a surface that leans by 75 degrees depth changes by 4 r from pixel to pixel; what differs more is another one.
+// On a surface tilted by 75 degrees depth changes by 4 r from pixel to pixel. A larger change means another surface.
 constexpr double kSteepest_r = 4;
-// A view whose distance is beyond this fraction of eps_r says no more than that no edge is near.
+// A distance beyond this fraction of eps_r only means that no edge is near.
 constexpr double kFar = 0.9;
-// Of the four pixels about a place, of those that see the point: that of the nearest at least.
+// Minimum weight of the pixels that see the point, of the four pixels around it: the weight of the nearest.
 constexpr double kMinWeight = 0.25;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The field of one posed view as fusion keeps it, and what it says of points in space.
+// The field of one posed view in the form that fusion keeps, and its distances for points in space.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace maq {
 
-// A surface's normal is fitted to pixels up to so many to either side.
+// The radius in pixels for fitting the normal of a surface.
 inline constexpr int kNormalWindow_px = 2;
 
 class FusionView {
@@ -24,15 +24,15 @@ class FusionView {
   double median_depth_m() const { return median_depth_m_; }
 
   double depth(int x, int y) const { return depth_m_[size_t(y) * size_t(camera_.width_px) + size_t(x)]; }
-  // In camera coordinates.
+  // Returns a point in camera coordinates.
   Vec3 point(int x, int y) const;
-  // Of length 1 and towards the camera, in its coordinates: of the plane through inverse depth, which is linear in the
-  // pixel, by least squares over the pixels nearby in depth. Where they do not determine one, the way to the camera.
+  // Returns the normal (length 1, towards the camera, in its coordinates) of the plane through inverse depth, fitted by
+  // least squares to pixels of similar depth. If they do not determine a plane, it is the direction to the camera.
   Vec3 normal(int x, int y) const;
 
-  // Metres from a point of camera coordinates to the nearest sharp curve, interpolated between those of the four
-  // pixels about it that are within reach_r of it, and eps_r * r_m where that is as far as this view can tell; negative
-  // where the nearest of them is not, so that the view did not see the point's surface.
+  // Returns the distance in metres from a point in camera coordinates to the nearest sharp curve, interpolated between
+  // the four pixels around it that are within reach_r. It is eps_r * r_m where this view sees no edge. Negative: the
+  // nearest pixel is not within reach, so that the view did not see the point's surface.
   double distance_m(Vec3 at, double r_m, double reach_r) const;
 
   Vec3 to_camera(Vec3 direction) const;

@@ -7,10 +7,10 @@ namespace maq {
 namespace {
 
 constexpr double kFine = 256;
-constexpr int kBits = 21;  // of a coordinate in a key
+constexpr int kBits = 21;  // bits of a coordinate in a key
 constexpr int64_t kHalf = int64_t(1) << (kBits - 1);
 constexpr size_t kFirstSlots = 1 << 12;
-// More points of one cell say nothing new, and their sums fit.
+// More points in one cell add nothing, and this limit keeps the sums in range.
 constexpr uint32_t kMaxCount = 1 << 22;
 
 size_t hash_of(uint64_t key) {

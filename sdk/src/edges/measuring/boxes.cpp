@@ -6,8 +6,8 @@
 namespace maq {
 namespace {
 
-constexpr double kEndSigma_r = 0.15;         // of a corner along an edge, where its fit is perfect
-constexpr double kOneLengthFraction = 0.06;  // parallel edges of one box are as long as each other within that
+constexpr double kEndSigma_r = 0.15;         // uncertainty of a corner along an edge with a perfect fit
+constexpr double kOneLengthFraction = 0.06;  // parallel edges of one box have the same length within this fraction
 
 bool is_line(const EdgeCurve& curve) { return curve.type == CurveType::kLine; }
 
@@ -16,7 +16,7 @@ Vec3 direction_of(const EdgeCurves& curves, const EdgeCurve& curve) {
   return normalized(ends[1] - ends[0]);
 }
 
-// The axis that a direction runs along within the tolerance (a sine), or -1.
+// Returns the axis that is parallel to a direction within the tolerance (a sine), or -1.
 int axis_of(const std::array<Vec3, 3>& axes, Vec3 direction, double tolerance) {
   for (int k = 0; k < 3; ++k) {
     if (length(cross(axes[size_t(k)], direction)) <= tolerance) return k;
@@ -26,12 +26,13 @@ int axis_of(const std::array<Vec3, 3>& axes, Vec3 direction, double tolerance) {
 
 }  // namespace
 
-// Two lines at a right angle, one of which is a convex crease, as the corner of a room has none; the third axis is
-// across both.
+// Two lines at a right angle. One must be a convex crease: the corner of a room has none. The third axis is
+// perpendicular to both.
 bool BoxFinder::begin(const EdgeCurves& curves, int corner, double tolerance, std::array<Vec3, 3>& axes) {
   for (size_t i = 0; i < curves.curves.size(); ++i) {
     const EdgeCurve& a = curves.curves[i];
-    if (is_taken_[i] || !is_line(a) || a.bend != Bend::kConvex || (a.corner[0] != corner && a.corner[1] != corner))
+    if (is_taken_[i] || !is_line(a) || a.convexity != Convexity::kConvex ||
+        (a.corner[0] != corner && a.corner[1] != corner))
       continue;
     for (size_t j = 0; j < curves.curves.size(); ++j) {
       const EdgeCurve& b = curves.curves[j];
@@ -74,14 +75,14 @@ void BoxFinder::collect(const EdgeCurves& curves, int corner, double tolerance, 
 bool BoxFinder::measure(const EdgeField& field, const EdgeCurves& curves, MeasuredBox& box) const {
   std::array<double, 3> size{}, spread{};
   for (int axis = 0; axis < 3; ++axis) {
-    // The mean of the lines between two corners, weighted by how well their ends are known, around the best of them.
+    // The mean of the lines between two corners, weighted by the certainty of their ends, around the best line.
     const auto each = [&](auto&& visit) {
       for (const Side& side : sides_) {
         const EdgeCurve& curve = curves.curves[size_t(side.curve)];
         if (side.axis != axis || curve.corner[0] < 0 || curve.corner[1] < 0) continue;
         const Vec3* ends = &curves.points[size_t(curve.first_point)];
         const double r = std::max(ends[0].z, ends[1].z) / focal_px(field.intrinsics);
-        visit(curve.length_m, std::sqrt(2.0) * r * (kEndSigma_r + curve.rms_r));
+        visit(curve.length_m, std::sqrt(2.0) * r * (kEndSigma_r + curve.rms_footprints));
       }
     };
     double best = 0, least = INFINITY, sum = 0, weights = 0, squares = 0;
@@ -99,7 +100,7 @@ bool BoxFinder::measure(const EdgeField& field, const EdgeCurves& curves, Measur
       if (std::abs(length_m - best) > kOneLengthFraction * best) return;
       squares += (length_m - sum / weights) * (length_m - sum / weights), count += 1;
     });
-    // What the fits tell, or how far the lines disagree.
+    // The larger of the uncertainty of the fits and the spread of the lines.
     spread[size_t(axis)] = 2 * std::max(1 / std::sqrt(weights), std::sqrt(squares / count));
   }
   std::array<int, 3> order{0, 1, 2};
@@ -119,7 +120,7 @@ bool BoxFinder::measure(const EdgeField& field, const EdgeCurves& curves, Measur
   for (size_t k = 0; k < 3; ++k) {
     box.axis[k] = axes[size_t(order[k])];
     box.size_m[k] = size[size_t(order[k])];
-    box.plus_minus_m[k] = spread[size_t(order[k])];
+    box.size_tolerance_m[k] = spread[size_t(order[k])];
   }
   return box.corners >= 4;
 }
@@ -129,7 +130,7 @@ void BoxFinder::find(const EdgeField& field, const EdgeCurves& curves, std::vect
   found.clear();
   const double tolerance = std::sin(std::clamp(tolerance_deg, 0.0, 45.0) * M_PI / 180);
   is_taken_.assign(curves.curves.size(), 0);
-  // Corners with many curves tell the most.
+  // Corners with many curves are the most reliable.
   for (const int least : {3, 2}) {
     for (size_t corner = 0; corner < curves.corners.size(); ++corner) {
       if (curves.corners[corner].curve_count < least) continue;

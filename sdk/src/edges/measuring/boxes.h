@@ -10,16 +10,16 @@ namespace maq {
 
 struct MeasuredBox {
   Vec3 centre;
-  std::array<Vec3, 3> axis;            // directions of length 1, at right angles
-  std::array<double, 3> size_m;        // along each axis, the longest first
-  std::array<double, 3> plus_minus_m;  // two standard deviations, as far as the fits tell
-  int corners = 0;                     // that were seen of it, 4 to 7
+  std::array<Vec3, 3> axis;                // directions of length 1, at right angles
+  std::array<double, 3> size_m;            // along each axis, the longest first
+  std::array<double, 3> size_tolerance_m;  // two standard deviations
+  int corners = 0;                         // visible corners, 4 to 7
 };
 
 class BoxFinder {
  public:
   // Corners in which lines meet within `tolerance_deg` of right angles start a box; lines that are connected to it and
-  // run along its axes belong to it. A box is told where each of its three sides has a line between two corners.
+  // run along its axes belong to it. A box needs a line between two corners along each of its three sides.
   // `found` is overwritten: the largest volume first. Lines that bound more than one box belong to the first.
   void find(const EdgeField& field, const EdgeCurves& curves, std::vector<MeasuredBox>& found,
             double tolerance_deg = 8);
@@ -34,7 +34,7 @@ class BoxFinder {
 
   std::vector<Side> sides_;
   std::vector<int> to_visit_;
-  std::vector<char> is_taken_, is_visited_;  // curves that are of a box; corners
+  std::vector<char> is_taken_, is_visited_;  // curves of a box; corners
 };
 
 }  // namespace maq

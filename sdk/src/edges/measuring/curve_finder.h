@@ -1,4 +1,4 @@
-// What an app asks of a field at once: its curves, the boxes among them, and what a pointer snaps to.
+// Finds the curves of a field and the boxes among them, and keeps the data for snapping.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ struct CurveRequest {
   bool finds_boxes = true;
 };
 
-// Kept apart from the field that they were found in.
+// The curves and boxes of a field, which may outlive it.
 struct FoundCurves {
   EdgeCurves curves;
   std::vector<MeasuredBox> boxes;
@@ -22,10 +22,10 @@ struct FoundCurves {
   float curves_ms = 0, boxes_ms = 0;
 };
 
-// Keeps memory from frame to frame. Not for two threads at once.
+// Keeps memory from frame to frame. One thread at a time.
 class CurveFinder {
  public:
-  // `found` is overwritten and its memory reused. Throws what CurveExtractor throws.
+  // Overwrites `found` and reuses its memory. Throws the errors of CurveExtractor.
   void find(const EdgeField& field, const CurveRequest& request, FoundCurves& found);
 
  private:

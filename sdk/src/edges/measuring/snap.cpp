@@ -14,7 +14,7 @@ struct ImagePoint {
   double x, y;
 };
 
-// Sees curves as a picture, in which distances are measured: the depth camera, or one that looks along a ray.
+// Projects curves to an image in which distances are measured: of the depth camera, or of a camera along a ray.
 struct Viewer {
   Intrinsics camera;
   Vec3 origin;
@@ -29,17 +29,17 @@ struct Viewer {
   }
 };
 
-// How far a piece of a polyline is from (x, y) as it is seen, and at which fraction of its way in space.
+// The distance of a segment of a polyline from (x, y) in the image, and the fraction of the segment in space.
 double distance_to_piece(const Viewer& viewer, Vec3 a, Vec3 b, double x, double y, double& fraction) {
   const ImagePoint p = viewer.projected(a), q = viewer.projected(b);
   const double dx = q.x - p.x, dy = q.y - p.y, size = dx * dx + dy * dy;
   const double s = size > 0 ? std::clamp(((x - p.x) * dx + (y - p.y) * dy) / size, 0.0, 1.0) : 0.0;
-  // This fraction of the way in the picture is less of the way in space where the piece runs away from the viewer.
+  // This fraction in the image is a smaller fraction in space where the segment runs away from the viewer.
   fraction = s * a.z / (s * a.z + (1 - s) * b.z);
   return std::hypot(p.x + s * dx - x, p.y + s * dy - y);
 }
 
-// The nearest corner within `radius` pixels of the viewer's picture, or else the nearest edge.
+// Finds the nearest corner within `radius` pixels of the viewer's image, or else the nearest edge.
 Snap snap_to_curves(const Viewer& viewer, const EdgeCurves& curves, double x, double y, double radius) {
   Snap snap;
   double best = radius;
@@ -69,7 +69,7 @@ Snap snap_to_curves(const Viewer& viewer, const EdgeCurves& curves, double x, do
   return snap;
 }
 
-// What the frame saw in a direction: where it is, 0 along the ray: nothing is known.
+// Returns the point that the frame saw in a direction; 0 along the ray: unknown.
 double depth_at(const EdgeField& field, double x_px, double y_px) {
   if (!(x_px > -0.5 && y_px > -0.5 && x_px < field.width - 0.5 && y_px < field.height - 0.5)) return 0;
   if (field.depth_m.empty()) return 0;
@@ -80,8 +80,8 @@ Vec3 ray_of(const Intrinsics& camera, double x_px, double y_px) {
   return {(x_px - camera.cx_px) / camera.fx_px, (y_px - camera.cy_px) / camera.fy_px, 1};
 }
 
-// How far a point of the frame is off a plane, in r. Off the plane, not along the ray: at a grazing angle the ray
-// leaves it slowly.
+// Returns the distance of a point of the frame from a plane, in r. It is perpendicular to the plane, not along the ray:
+// at a grazing angle the ray leaves the plane slowly.
 double off_plane_r(const EdgeField& field, const Plane& plane, Vec3 point) {
   return std::abs(dot(plane.normal, point) - plane.offset_m) * focal_px(field.intrinsics) / point.z;
 }

@@ -94,7 +94,7 @@ void ClipWriter::begin(const ImageView& first) {
     throw Error(MAQ_ERROR_UNSUPPORTED, file_.path(), ": this OpenCV does not write ",
                 format_ == ClipFormat::kMpeg4 ? "MPEG-4" : "Motion JPEG", " of ", width, " x ", height,
                 " pixels; try a name that ends in ", format_ == ClipFormat::kMpeg4 ? ".avi" : ".mp4",
-                ", or a smaller picture.");
+                ", or a smaller image.");
   }
   width_px_ = first.width_px;
   height_px_ = first.height_px;
@@ -105,12 +105,12 @@ void ClipWriter::add(const ImageView& image) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " is finished: nothing can be added.");
   }
   if (encoder_ != nullptr && (image.width_px != width_px_ || image.height_px != height_px_)) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The picture has ", image.width_px, " x ", image.height_px,
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The image has ", image.width_px, " x ", image.height_px,
                 " pixels, but the first of ", file_.path(), " has ", width_px_, " x ", height_px_,
                 "; begin another clip.");
   }
   if (image.width_px < 2 || image.height_px < 2) {
-    throw Error(MAQ_ERROR_IMAGE_SIZE, "The picture has ", image.width_px, " x ", image.height_px,
+    throw Error(MAQ_ERROR_IMAGE_SIZE, "The image has ", image.width_px, " x ", image.height_px,
                 " pixels, but a clip needs 2 x 2 at least.");
   }
   ImageView bgr = as_bgr(image, bgr_);
@@ -119,14 +119,14 @@ void ClipWriter::add(const ImageView& image) {
   const BlockedWriteSignals blocked;  // the encoder writes by itself
   if (encoder_ == nullptr) begin(image);
   if (!encoder_->write(bgr)) {
-    throw Error(MAQ_ERROR_INTERNAL, "A picture of ", file_.path(), " could not be encoded.");
+    throw Error(MAQ_ERROR_INTERNAL, "An image of ", file_.path(), " could not be encoded.");
   }
   ++images_;
 }
 
 void ClipWriter::finish() {
   if (is_finished_) return;
-  if (images_ == 0) throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " has no picture yet: add one.");
+  if (images_ == 0) throw Error(MAQ_ERROR_INVALID_ARGUMENT, file_.path(), " has no image yet: add one.");
   end_encoding();
   if (!is_whole(file_.temporary_path(), format_)) {
     throw Error(MAQ_ERROR_UNWRITABLE, file_.path(), " cannot be written to its end: make room on the disk.");

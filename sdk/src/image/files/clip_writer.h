@@ -18,7 +18,7 @@ constexpr double kMaxClipFps = 1000;
 class ClipWriter {
  public:
   // MPEG-4 in .mp4 or Motion JPEG in .avi, by the extension of `path`; `fps` from kMinClipFps to kMaxClipFps.
-  // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, what AtomicFile throws, and what file_codecs() throws.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, and the errors of AtomicFile and file_codecs().
   ClipWriter(const std::string& path, double fps);
   ~ClipWriter();
 
@@ -38,7 +38,7 @@ class ClipWriter {
 
   ClipFormat format_;
   double fps_;
-  int width_px_ = 0, height_px_ = 0;  // of the first image
+  int width_px_ = 0, height_px_ = 0;  // size of the first image
   uint64_t images_ = 0;
   bool is_finished_ = false;
   std::vector<uint8_t> bgr_;

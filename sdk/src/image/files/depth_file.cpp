@@ -28,9 +28,9 @@ DecodedImage decode_depth(const std::string& path) {
     check_image_size(depth.view.width_px, depth.view.height_px, path);
   }
   if (depth.view.planes[0].data == nullptr) {
-    throw Error(
-        MAQ_ERROR_UNSUPPORTED, path, " is no depth image: its pixels are colours or have 8 bits. ",
-        "Save depth as a grey PNG or TIFF of 16 bits or a TIFF of 32-bit floats; leave depth_unit out for pictures.");
+    throw Error(MAQ_ERROR_UNSUPPORTED, path, " is no depth image: its pixels are colours or have 8 bits. ",
+                "Save depth as a grey PNG or TIFF of 16 bits or a TIFF of 32-bit floats; leave depth_unit out for "
+                "colour images.");
   }
   return depth;
 }

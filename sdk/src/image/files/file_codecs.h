@@ -1,4 +1,4 @@
-// What decodes and encodes image and video files: libpng and OpenCV's imgcodecs and videoio, the only place of the
+// Decodes and encodes image and video files with libpng and OpenCV's imgcodecs and videoio, the only place of the
 // library where OpenCV is. JPEG images are decoded without it (jpeg.h). Android brings decoders of its own (android/).
 //
 // They bring some two hundred shared libraries on Debian (GDAL and FFmpeg among them), 65 MB of memory and more than a
@@ -84,7 +84,7 @@ class FileCodecs {
 // (tests), it is those.
 const FileCodecs& file_codecs();
 
-// What the library exports, a FileCodecs (core/module.h).
+// The export of the library, a FileCodecs (core/module.h).
 constexpr char kFileCodecsSymbol[] = "maquette_file_codecs";
 
 }  // namespace maq

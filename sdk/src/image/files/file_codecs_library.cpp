@@ -51,7 +51,7 @@ class MemoryCheckedCodecs : public FileCodecs {
   }
 
  private:
-  // More than codecs take: themselves, for each byte of an image file, for each pixel of a picture.
+  // More than codecs take: themselves, for each byte of an image file, for each pixel of an image.
   static constexpr size_t kCodecBytes = size_t(64) << 20, kPixelsOfAByte = 16, kBytesOfAPixel = 16;
 
   const FileCodecs& codecs_;

@@ -126,8 +126,8 @@ namespace {
 std::vector<uint8_t> encode(const ImageView& image, const std::string& extension) {
   std::vector<uint8_t> bytes;
   if (!file_codecs().encode_image(extension, image, bytes)) {
-    throw Error(MAQ_ERROR_INTERNAL, "A picture of ", image.width_px, " x ", image.height_px,
-                " could not be encoded as ", extension, ": there may be too little memory.");
+    throw Error(MAQ_ERROR_INTERNAL, "An image of ", image.width_px, " x ", image.height_px, " could not be encoded as ",
+                extension, ": there may be too little memory.");
   }
   return bytes;
 }
@@ -153,7 +153,7 @@ void write_image_file(const ImageView& image, const std::string& path, const Fra
 
 void write_image_file(const ImageView& image, const uint8_t* alpha, const std::string& path) {
   if (lower_case_extension(path) != ".png") {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " does not end in .png, the format for pictures with alpha.");
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " does not end in .png, the format for images with alpha.");
   }
   AtomicFile file(path);
   std::vector<uint8_t> rgba(size_t(4) * size_t(image.width_px) * size_t(image.height_px));

@@ -32,7 +32,7 @@ class Reader {
 
 struct JpegSegment {
   uint32_t marker = 0;
-  size_t offset = 0;  // of the marker
+  size_t offset = 0;  // position of the marker
 };
 
 // Goes from segment to segment of a JPEG image, up to the start of its first scan.
@@ -86,8 +86,8 @@ std::optional<SizePx> webp_size(const Reader& in) {
   return {};
 }
 
-// Of a whole TIFF file (TIFF 6.0, section 2): its byte order, 42, where its first directory is, and that directory's
-// entries of 12 bytes each.
+// Reads a whole TIFF file (TIFF 6.0, section 2): its byte order, 42, the position of its first directory, and the
+// directory's entries of 12 bytes each.
 class TiffDirectory {
  public:
   explicit TiffDirectory(const Reader& in) : in_(in), is_little_(in.equals(0, "II*")) {}
@@ -96,7 +96,7 @@ class TiffDirectory {
   uint32_t number16(size_t offset) const { return is_little_ ? in_.little16(offset) : in_.big16(offset); }
   uint32_t number32(size_t offset) const { return is_little_ ? in_.little32(offset) : in_.big32(offset); }
 
-  // Where the entry's value is; nothing where there is no such entry, or no TIFF file.
+  // Returns the position of the entry's value; nothing without such an entry or a TIFF file.
   std::optional<size_t> find(uint32_t tag) const {
     if (!in_.has(0, 8) || (!is_little_ && std::memcmp(in_.at(0), "MM\0*", 4) != 0)) return {};
     const size_t directory = number32(4);
@@ -126,7 +126,7 @@ std::optional<SizePx> tiff_size(const Reader& in) {
   return SizePx{value(*width), value(*height)};
 }
 
-// Where EXIF data begin, behind the "Exif" that some put before them; 0: nowhere.
+// Returns the position of EXIF data, behind an optional "Exif"; 0: there are none.
 size_t exif_offset(const Reader& in, ImageFormat format) {
   const auto behind_name = [&](size_t offset) {
     return in.has(offset, 6) && std::memcmp(in.at(offset), "Exif\0\0", 6) == 0 ? offset + 6 : offset;
@@ -261,7 +261,7 @@ bool has_jpeg_end(const EncodedBytes& bytes) {
   JpegSegments segments(in);
   for (JpegSegment segment; segments.next(segment);) {
     if (segment.marker != kStartOfScan) continue;
-    // Of coded data, 0xff is followed by 0.
+    // In coded data, 0 follows 0xff.
     constexpr uint8_t kEnd[] = {0xff, 0xd9};
     const uint8_t* end = in.at(in.size());
     return std::search(in.at(segment.offset), end, std::begin(kEnd), std::end(kEnd)) != end;

@@ -1,4 +1,4 @@
-// What an encoded image says of itself before it is decoded: its format, its size, which way up it is.
+// The format, size and orientation of an encoded image, read before it is decoded.
 #pragma once
 
 #include <cstddef>
@@ -40,15 +40,15 @@ struct SizePx {
   int64_t height = 0;
 };
 
-// Of PNG, JPEG, WebP, BMP, GIF and TIFF, whose header may lie at the end of the file; nothing for other formats and for
-// truncated headers.
+// Reads PNG, JPEG, WebP, BMP, GIF and TIFF, whose header may lie at the end of the file; nothing for other formats and
+// for truncated headers.
 std::optional<SizePx> read_image_size(const EncodedBytes& bytes);
 
 // The EXIF orientation (Exif 2.32, 4.6.4, tag 274) of a whole JPEG, PNG or WebP image: 1 to 8, and 1 where there is
 // none.
 int read_exif_orientation(const EncodedBytes& bytes);
 
-// Where that number lies in the image, as two bytes.
+// The position of that number in the image, as two bytes.
 struct ExifOrientationPlace {
   size_t offset = 0;
   bool is_little_endian = false;

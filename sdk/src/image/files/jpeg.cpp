@@ -42,7 +42,7 @@ bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int
 
 namespace {
 
-// As OpenCV: K scales what Adobe's programs write, the complements of C, M and Y.
+// Like OpenCV: K scales the values of Adobe's programs, the complements of C, M and Y.
 void cmyk_to_bgr(const uint8_t* cmyk, size_t pixels, uint8_t* bgr) {
   for (size_t i = 0; i < pixels; ++i) {
     const int black = cmyk[4 * i + 3];
@@ -50,7 +50,7 @@ void cmyk_to_bgr(const uint8_t* cmyk, size_t pixels, uint8_t* bgr) {
   }
 }
 
-// Whether an image that libjpeg decoded in part lacks its end. Of several warnings it tells the first.
+// Returns whether an image that libjpeg decoded in part lacks its end. libjpeg reports only its first warning.
 bool is_cut(tjhandle decoder, const uint8_t* bytes, size_t size_bytes) {
   return !has_jpeg_end({bytes, size_bytes}) || std::strstr(tjGetErrorStr2(decoder), "remature end") != nullptr;
 }

@@ -28,8 +28,8 @@ class JpegDecoder {
 
 enum class JpegResult { kDecoded, kTruncated, kDamaged };
 
-// A photo, of any colours, at full accuracy, into `frame` as BGR8: to the bit what OpenCV decodes. What libjpeg only
-// warns of, such as bytes between segments, is decoded; what is cut is not. Over the limits of frame.h: damaged.
+// Decodes a photo of any colour space to BGR8 at full accuracy, bit-identical to OpenCV. Warnings of libjpeg, such as
+// bytes between segments, are ignored. Truncated images are refused; images over the limits of frame.h are damaged.
 JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& frame);
 
 class JpegEncoder {

@@ -77,7 +77,7 @@ class FfmpegSilence {
   static inline Callback default_ = nullptr;
 };
 
-// imdecode() tells std::cerr of the exceptions that it catches, whatever the level. What other threads say gets
+// imdecode() writes the exceptions that it catches to std::cerr at any log level. Output of other threads passes
 // through.
 class ErrorStreamGate : public std::streambuf {
  public:

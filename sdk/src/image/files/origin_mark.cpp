@@ -13,7 +13,7 @@ constexpr char kMark[] = "predicted\0maquette horizon_ns=";
 constexpr size_t kMarkBytes = sizeof kMark - 1, kMaxMarkOffset = 64;
 constexpr ptrdiff_t kEndOfPngHeader = 33, kEndOfJpegStart = 2;
 
-// Of PNG (ISO 3309).
+// The checksum of PNG (ISO 3309).
 uint32_t crc_of(const uint8_t* bytes, size_t count) {
   uint32_t crc = 0xffffffff;
   for (size_t i = 0; i < count; ++i) {

@@ -15,7 +15,7 @@ namespace maq {
 // ".jpg".
 void mark_origin(const FrameOrigin& origin, const std::string& extension, std::vector<uint8_t>& encoded);
 
-// What the mark of an encoded image says; of one without a mark that it was captured.
+// Reads the mark of an encoded image. An image without a mark was captured.
 FrameOrigin read_origin_mark(const EncodedBytes& encoded);
 
 }  // namespace maq

@@ -82,7 +82,7 @@ bool read_pixels(const Reader& reader, png_bytepp rows) {
   return true;
 }
 
-// Of a reader that has read the head.
+// For a reader that has read the head.
 DecodedImage decode(const Reader& reader, maq_pixel_format format, size_t pixel_bytes) {
   const size_t width = png_get_image_width(reader.png, reader.info);
   const size_t height = png_get_image_height(reader.png, reader.info);

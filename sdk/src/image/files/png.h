@@ -8,7 +8,7 @@
 
 namespace maq {
 
-// As BGR8, the high byte of 16 bits, without alpha. No width: it is damaged or truncated. Throws std::bad_alloc.
+// Decodes to BGR8, the high byte of 16 bits, without alpha. No width: damaged or truncated. Throws std::bad_alloc.
 DecodedImage decode_png(const uint8_t* bytes, size_t size_bytes);
 
 // A grey image of 16 bits as DEPTH16. One of other pixels has a size and no pixels. Otherwise as above.

@@ -1,9 +1,11 @@
-// What maps directions to pixels, in the convention of OpenCV: the centre of the top left pixel is (0, 0).
+// The mapping from directions to pixels, in the convention of OpenCV: the centre of the top left pixel is (0, 0).
 #pragma once
+
+#include "maquette/frame.h"
 
 namespace maq {
 
-// A base of what has more: a lens has distortion, a camera a pose.
+// The base of Lens, which adds distortion, and of PinholeCamera, which adds a pose.
 struct Intrinsics {
   int width_px = 0;
   int height_px = 0;
@@ -18,7 +20,12 @@ inline bool operator==(const Intrinsics& a, const Intrinsics& b) {
          a.cx_px == b.cx_px && a.cy_px == b.cy_px;
 }
 
-// The lens or camera with a larger or smaller picture: its field of view stays.
+// Drops the distortion.
+inline Intrinsics intrinsics_of(const maq_intrinsics& given) {
+  return {given.width_px, given.height_px, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
+}
+
+// Returns the lens or camera for a larger or smaller image with the same field of view.
 template <class HasIntrinsics>
 HasIntrinsics resized(const HasIntrinsics& from, int width_px, int height_px) {
   HasIntrinsics made = from;
@@ -27,7 +34,7 @@ HasIntrinsics resized(const HasIntrinsics& from, int width_px, int height_px) {
   made.height_px = height_px;
   made.fx_px *= scale_x;
   made.fy_px *= scale_y;
-  // The picture's edge, half a pixel outside of the first centre, stays where it is.
+  // The image's border, half a pixel outside of the first centre, keeps its place in the scene.
   made.cx_px = (from.cx_px + 0.5) * scale_x - 0.5;
   made.cy_px = (from.cy_px + 0.5) * scale_y - 0.5;
   return made;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kMaxAngle = 60 * 3.14159265358979323846 / 180;
 
-// What the distance from the axis, a tangent, is multiplied by; `r2` is its square.
+// Returns the factor for the distance from the axis, a tangent; `r2` is its square.
 double radial_factor(const Lens& lens, double r2) {
   const auto& k = lens.coefficients;
   if (lens.distortion == Distortion::kFisheye) {
@@ -64,7 +64,7 @@ Lens with_focal_lengths_times(const Lens& lens, double factor) {
   return made;
 }
 
-// Whether every pixel on the edge of an undistorted picture, and so all inside, comes from inside of the distorted one.
+// Returns whether all pixels on the border of an undistorted image, and so all pixels, come from the distorted one.
 bool is_filled(const Lens& lens, const LensProjection& projection, const Lens& undistorted) {
   const auto has_source = [&](int column, int row) {
     const auto at = projection.find((column - undistorted.cx_px) / undistorted.fx_px,
@@ -132,7 +132,7 @@ std::optional<Lens> without_distortion(const Lens& lens) {
     enough = short_of;
     short_of /= 2;
   }
-  // A narrower picture around the axis is a part of the wider one, so that bisection finds the smallest factor.
+  // A narrower image around the axis is a part of the wider one, so that bisection finds the smallest factor.
   for (int i = 0; i < 30; ++i) {
     const double middle = (enough + short_of) / 2;
     (is_enough(middle) ? enough : short_of) = middle;

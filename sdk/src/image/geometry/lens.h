@@ -1,4 +1,4 @@
-// How a real lens maps directions into its picture, in the conventions of OpenCV.
+// How a real lens maps directions into its image, in the conventions of OpenCV.
 #pragma once
 
 #include <array>
@@ -29,8 +29,8 @@ class LensProjection {
  public:
   explicit LensProjection(const Lens& lens);
 
-  // Where the direction (x, y, 1) falls; outside of the picture too. Nothing where the model does not hold: farther
-  // from the axis than the widest angle of undistorted pictures, or than where the distortion stops growing.
+  // Where the direction (x, y, 1) falls; outside of the image too. Nothing where the model does not hold: farther
+  // from the axis than the widest angle of undistorted images, or than where the distortion stops growing.
   std::optional<PixelPosition> find(double x, double y) const;
 
   // Likewise for the directions (x[i], y, 1) of a row of pixels, to the bit; NaN for nothing.
@@ -41,11 +41,11 @@ class LensProjection {
   double max_radius_ = 0;  // tangent of the largest angle to the axis
 };
 
-// The lens without distortion for an undistorted picture of the same size and principal point. Its focal lengths are
-// multiplied by the smallest factor with which every pixel of the new picture comes from inside of the old one: nothing
+// The lens without distortion for an undistorted image of the same size and principal point. Its focal lengths are
+// multiplied by the smallest factor with which every pixel of the new image comes from inside of the old one: nothing
 // is blank, what is seen at the edges only in part is lost (as OpenCV's getOptimalNewCameraMatrix with alpha 0). It
 // reaches at most 60 degrees from the axis. Nothing where there is no such factor up to 16: the principal point is
-// outside of the picture, or the distortion is not invertible in it.
+// outside of the image, or the distortion is not invertible in it.
 std::optional<Lens> without_distortion(const Lens& lens);
 
 }  // namespace maq

@@ -186,11 +186,11 @@ struct AreaAxis {
     float weight;
   };
   std::vector<Tap> taps;
-  std::vector<size_t> begin;  // of each new pixel's taps; one more than there are pixels
+  std::vector<size_t> begin;  // first tap of each new pixel, plus one entry for the end
 
   AreaAxis(int from_px, int to_px) {
     const double scale = pixels_per_pixel(from_px, to_px);
-    constexpr double kNothing = 1e-3;  // of a pixel: what is left out
+    constexpr double kNothing = 1e-3;  // smaller weights are left out
     for (int i = 0; i < to_px; ++i) {
       begin.push_back(taps.size());
       const double low = i * scale, high = low + scale;
@@ -281,7 +281,7 @@ void resize_to_bgr(const ImageView& from, int width_px, int height_px, Frame& to
 void shrink(const ImageView& image, int width_px, int height_px, Frame& frame) {
   if (image.format != MAQ_PIXEL_BGR8 || width_px < 1 || height_px < 1 || width_px > image.width_px ||
       height_px > image.height_px) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A picture of ", image.width_px, " x ", image.height_px, " pixels in ",
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "An image of ", image.width_px, " x ", image.height_px, " pixels in ",
                 pixel_format_name(image.format), " cannot be shrunk to ", width_px, " x ", height_px, " in BGR.");
   }
   resize(bgr_source(image), bgr_target(frame, width_px, height_px));

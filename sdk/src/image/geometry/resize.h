@@ -1,4 +1,4 @@
-// Resizes pictures of bytes, to the bit as OpenCV's resize.
+// Resizes images of bytes, to the bit as OpenCV's resize.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ void resize(const BytePicture<const uint8_t>& from, const BytePicture<uint8_t>& 
 // The image of `from` in any format as `to`, in BGR, of that size.
 void resize_to_bgr(const ImageView& from, int width_px, int height_px, Frame& to);
 
-// The BGR picture `image` as `frame` of that smaller size. Throws MAQ_ERROR_INVALID_ARGUMENT unless `image` is BGR and
+// The BGR image `image` as `frame` of that smaller size. Throws MAQ_ERROR_INVALID_ARGUMENT unless `image` is BGR and
 // no smaller.
 void shrink(const ImageView& image, int width_px, int height_px, Frame& frame);
 

@@ -22,21 +22,21 @@ inline uint64_t spread(const uint8_t* pixel) {
   return uint64_t(pixel[0]) | uint64_t(pixel[1]) << 20 | uint64_t(pixel[2]) << 40;
 }
 
-// Of all three at once: what one borrows from the next cancels in the sum, which has no negative part.
+// Computes all three at once: what one borrows from the next cancels in the sum, which has no negative part.
 inline uint64_t blend(uint64_t first, uint64_t second, unsigned weight) {
   return first * kPixel + (second - first) * weight;
 }
 
-// Where the pixels of a row are read in another picture.
+// The positions in another image for the pixels of a row.
 struct Positions {
   explicit Positions(int width)
       : column_px(size_t(width)), row_px(size_t(width)), column(size_t(width)), row(size_t(width)) {}
 
   std::vector<double> column_px, row_px;  // NaN: nowhere
-  std::vector<int> column, row;           // the same in fractions of a pixel, where they are in the picture
+  std::vector<int> column, row;           // the same in fractions of a pixel, where they are in the image
 };
 
-// `valid` becomes 255 for positions inside of the picture, 0 for others.
+// `valid` becomes 255 for positions inside of the image, 0 for others.
 MAQ_SIMD_CLONES void to_fractions(Positions& positions, int width, int height, uint8_t* valid) {
   const double right = width - 0.5, bottom = height - 0.5;
   const size_t count = positions.column.size();
@@ -53,8 +53,8 @@ MAQ_SIMD_CLONES void to_fractions(Positions& positions, int width, int height, u
   }
 }
 
-// A row of pixels of the BGR picture, bilinear, to the bit as OpenCV's remap reads it: at the nearest 1/32 of a pixel.
-// Beyond the border the last pixels are repeated. What is not valid is black.
+// A row of pixels of the BGR image, bilinear, to the bit as OpenCV's remap reads it: at the nearest 1/32 of a pixel.
+// Beyond the border the last pixels are repeated. Invalid positions are black.
 void read_row(const ImageView& bgr, const Positions& positions, const uint8_t* valid, uint8_t* to) {
   const uint8_t* const pixels = bgr.planes[0].data;
   const size_t stride = bgr.planes[0].stride_bytes;
@@ -83,17 +83,17 @@ void read_row(const ImageView& bgr, const Positions& positions, const uint8_t* v
 
 }  // namespace
 
-// The way from the undistorted picture into the distorted one is a formula, which is written out in lens.cpp: OpenCV's
-// says nothing of directions where it folds back into the picture.
+// lens.cpp has the formula from the undistorted image to the distorted one. OpenCV's formula is not defined for
+// directions where it folds back into the image.
 void undistort(const ImageView& distorted, const Lens& lens, const Lens& undistorted, Frame& frame,
                std::vector<uint8_t>& valid) {
   if (distorted.format != MAQ_PIXEL_BGR8 || distorted.width_px != lens.width_px ||
       distorted.height_px != lens.height_px) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The picture is ", distorted.width_px, " x ", distorted.height_px,
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The image is ", distorted.width_px, " x ", distorted.height_px,
                 " pixels in ", pixel_format_name(distorted.format), ", but its lens is for ", lens.width_px, " x ",
                 lens.height_px, " in BGR.");
   }
-  check_image_size(undistorted.width_px, undistorted.height_px, "The undistorted picture");
+  check_image_size(undistorted.width_px, undistorted.height_px, "The undistorted image");
   const int width = undistorted.width_px, height = undistorted.height_px;
   uint8_t* pixels = frame.allocate_bgr(width, height);
   valid.resize(size_t(width) * size_t(height));

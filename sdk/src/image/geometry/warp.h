@@ -1,7 +1,7 @@
-// Pictures rotated, moved or scaled by an affine map, bilinear.
+// Images rotated, moved or scaled by an affine map, bilinear.
 //
 // Not by OpenCV's warpAffine, which before its version 5 rounds positions to 1/32 of a pixel: an error that is seen
-// where a picture has edges, and another one than in what the networks learnt from. Beyond the border the last pixels
+// where an image has edges, and another one than in what the networks learnt from. Beyond the border the last pixels
 // are repeated.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 namespace maq {
 
-// Takes a pixel of one picture to another picture's: x' = m[0] x + m[1] y + m[2], y' = m[3] x + m[4] y + m[5].
+// Takes a pixel of one image to another image's: x' = m[0] x + m[1] y + m[2], y' = m[3] x + m[4] y + m[5].
 using PixelMap = std::array<double, 6>;
 
 // Rows of pixels without padding.
@@ -28,7 +28,7 @@ struct Raster {
 void warp_to_rgb(const ImageView& photo, const PixelMap& to_source, int width_px, int height_px,
                  std::vector<float>& rgb);
 
-// Rows [top, bottom) of `to`, so that several threads can share a picture. `channels` is 1 or 3.
+// Rows [top, bottom) of `to`, so that several threads can share an image. `channels` is 1 or 3.
 void warp_bytes(const Raster<const uint8_t>& from, int channels, const PixelMap& to_source, const Raster<uint8_t>& to,
                 int top, int bottom);
 // Likewise, but of the nearest pixel: between two depths there need not be anything.

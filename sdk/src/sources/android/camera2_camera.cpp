@@ -38,7 +38,7 @@ int64_t boottime_ns() {
 template <class Object, class Result>
 using Owned = std::unique_ptr<Object, Result (*)(Object*)>;
 
-// What streaming needs, in the order in which it is made; the end is in the other direction. Android's rules: the
+// The objects for streaming, in the order of their creation; the end is in the other direction. Android's rules: the
 // device is closed before the reader that it fills is deleted, and no image is out then.
 struct Camera2Stream {
   explicit Camera2Stream(const ndk::Functions& functions)
@@ -258,7 +258,7 @@ class Camera2Camera final : public Camera {
     return Event::kLost;
   }
 
-  // What is wrong with the image, or nothing: then `slot` is held and `buffer` shows it.
+  // Returns the problem of the image, or nothing: then `slot` is held and `buffer` shows the image.
   std::optional<std::string> read_image(const ndk::AImage& image, Slot& slot, CameraBuffer& buffer) {
     YuvImage found;
     int64_t stamp_ns = 0;
@@ -295,7 +295,7 @@ class Camera2Camera final : public Camera {
 
   const ndk::Functions& functions_;
   std::string name_, label_, identity_;
-  CameraFormat format_;    // of the rotated pictures
+  CameraFormat format_;    // format of the rotated images
   int quarter_turns_ = 0;  // clockwise
   std::optional<maq_intrinsics> intrinsics_;
   bool has_boottime_ = false;
@@ -303,7 +303,7 @@ class Camera2Camera final : public Camera {
   uint32_t sequence_ = 0;
   int bad_images_ = 0;
   Camera2Mailbox mailbox_;
-  std::mutex mutex_;  // of stream_, while an image of it is out
+  std::mutex mutex_;  // guards stream_ while an image of it is out
   std::optional<Camera2Stream> stream_;
 };
 

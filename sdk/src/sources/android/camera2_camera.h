@@ -17,7 +17,7 @@ namespace maq {
 // rotated by `display_deg` (a multiple of 90) from the device's natural orientation. They are NV12 in memory of the
 // camera's own: they outlive Android's images, which go back at once. Throws MAQ_ERROR_NOT_FOUND,
 // MAQ_ERROR_NO_PERMISSION, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_OUT_OF_MEMORY, and MAQ_ERROR_UNSUPPORTED
-// for a camera without pictures for processing. `functions` must outlive the camera.
+// for a camera without images for processing. `functions` must outlive the camera.
 std::shared_ptr<Camera> open_android_camera(const ndk::Functions& functions, const std::string& name,
                                             const CameraRequest& request, int display_deg, int buffers);
 

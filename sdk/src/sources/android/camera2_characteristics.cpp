@@ -154,7 +154,7 @@ void Camera2Characteristics::read_lens(const ndk::Functions& functions, const nd
 }
 
 Camera2Size Camera2Characteristics::nearest_size(int width_px, int height_px) const {
-  if (sizes_.empty()) refuse_camera(label_, "offers no pictures for processing (YUV_420_888)");
+  if (sizes_.empty()) refuse_camera(label_, "offers no images for processing (YUV_420_888)");
   const auto error = [&](const Camera2Size& size) {
     const double size_error =
         std::abs(std::log(double(size.width_px) / width_px)) + std::abs(std::log(double(size.height_px) / height_px));

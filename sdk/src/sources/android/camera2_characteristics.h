@@ -1,4 +1,4 @@
-// What Android says of a camera before it is opened: its sizes, rates, lens and clock. All of it is checked.
+// Sizes, rates, lens and clock of a camera that is not open, read from Android and checked.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct Camera2Size {
   double fps = 0;  // at most; 0: not known
 };
 
-// As Android writes it: frames a second, or thousandths of them on some old devices.
+// Android's number: frames a second, or thousandths of them on some old devices.
 struct Camera2Rates {
   int32_t min = 0;
   int32_t max = 0;
@@ -42,27 +42,27 @@ class Camera2Characteristics {
 
   // "back", "front" or "external"; "" when it does not say.
   const char* facing() const { return facing_; }
-  // How often to rotate its pictures by 90 degrees clockwise, 0 to 3, to show them upright on a display that is rotated
+  // How often to rotate its images by 90 degrees clockwise, 0 to 3, to show them upright on a display that is rotated
   // by `display_deg` from the device's natural orientation (Display.getRotation), a multiple of 90.
   int quarter_turns(int display_deg) const;
   // Whether times of images are of CLOCK_BOOTTIME; otherwise they are near CLOCK_MONOTONIC.
   bool has_boottime() const { return has_boottime_; }
-  // Of the pixels that this build understands (YUV_420_888).
+  // Sizes for the pixel format of this build (YUV_420_888).
   const std::vector<Camera2Size>& sizes() const { return sizes_; }
   // Throws MAQ_ERROR_UNSUPPORTED when there are none.
   Camera2Size nearest_size(int width_px, int height_px) const;
   // With the nearest maximum, and of those the highest minimum: the rate that was asked for, whatever the light.
   // Nothing when the device lists none.
   std::optional<Camera2Rates> nearest_rates(double fps) const;
-  // For pictures of that size before they are rotated, which show the middle of what the sensor sees.
+  // For images of that size before they are rotated, which show the middle of what the sensor sees.
   std::optional<maq_intrinsics> intrinsics(int width_px, int height_px) const;
 
  private:
   struct Lens {
     double fx, fy, cx, cy;      // in pixels of the sensor, whose first has its centre at 0.5, 0.5
     double distortion[5] = {};  // k1, k2, k3, p1, p2
-    double width, height;       // of the part of the sensor that these refer to
-    double scale_x, scale_y;    // from there to the part that pictures show
+    double width, height;       // size of the part of the sensor that these refer to
+    double scale_x, scale_y;    // from there to the part that images show
   };
 
   void read_sizes(const ndk::Functions& functions, const ndk::ACameraMetadata& metadata);
@@ -70,14 +70,14 @@ class Camera2Characteristics {
 
   std::string label_;
   const char* facing_ = "";
-  int orientation_deg_ = 0;  // clockwise, of its pictures, for the device's natural orientation
+  int orientation_deg_ = 0;  // clockwise, of its images, for the device's natural orientation
   bool has_boottime_ = false;
   std::vector<Camera2Size> sizes_;
   std::vector<Camera2Rates> rates_;
   std::optional<Lens> lens_;
 };
 
-// Of pictures that are rotated by 90 degrees clockwise so often.
+// Returns the intrinsics after `quarter_turns` clockwise rotations by 90 degrees.
 maq_intrinsics rotated_intrinsics(maq_intrinsics of_picture, int quarter_turns);
 
 // When an image was taken, of CLOCK_MONOTONIC: `stamp_ns` is of CLOCK_BOOTTIME, which is `boottime_now_ns` now, or of

@@ -29,7 +29,7 @@ const Meaning kMeanings[] = {
      "Open it again; restart the device if that does not help."},
     {ndk::ACAMERA_ERROR_NOT_ENOUGH_MEMORY, MAQ_ERROR_OUT_OF_MEMORY, "there is not enough memory",
      "Ask for a smaller size or fewer frames."},
-    {ndk::ACAMERA_ERROR_STREAM_CONFIGURE_FAIL, MAQ_ERROR_UNSUPPORTED, "the device refuses this stream of pictures",
+    {ndk::ACAMERA_ERROR_STREAM_CONFIGURE_FAIL, MAQ_ERROR_UNSUPPORTED, "the device refuses this stream of images",
      "Ask for another size."},
     {ndk::ACAMERA_ERROR_METADATA_NOT_FOUND, MAQ_ERROR_UNSUPPORTED, "the device does not say it", "Use another camera."},
 };

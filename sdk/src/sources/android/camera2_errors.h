@@ -1,4 +1,4 @@
-// What a status of Android's camera functions means to an app: a status of the C API, and what to do about it.
+// Maps a status of Android's camera functions to a status of the C API and a remedy.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ maq_status camera2_maq_status(ndk::camera_status_t status);
 // Throws camera2_maq_status(status): "`name` `what`: the meaning of the status.", and what to do.
 [[noreturn]] void fail_camera2(const std::string& name, const std::string& what, ndk::camera_status_t status);
 
-// The same for the functions of images.
+// Maps a status of the image functions.
 [[noreturn]] void fail_camera2_images(const std::string& name, const std::string& what, ndk::media_status_t status);
 
-// What the callback onError says, as the reason of a loss.
+// Returns the reason of a loss in the words of the callback onError.
 const char* camera2_loss(int error);
 
 constexpr char kCamera2Disconnected[] =

@@ -116,7 +116,7 @@ MAQ_VALUE(ACAMERA_TYPE_FLOAT);
 MAQ_VALUE(ACAMERA_TYPE_INT64);
 #undef MAQ_VALUE
 
-// Of callbacks the types too: C code calls them.
+// The types of callbacks are compared, too: C code calls them.
 #define MAQ_MEMBER(name, member)                                                                         \
   static_assert(sizeof(ndk::name) == sizeof(::name), #name);                                             \
   static_assert(offsetof(ndk::name, member) == offsetof(::name, member) &&                               \

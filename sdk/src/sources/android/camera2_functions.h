@@ -36,7 +36,7 @@ enum camera_status_t : int {
   ACAMERA_ERROR_PERMISSION_DENIED = -10013,
 };
 
-// Of the callback onError.
+// Errors of the callback onError.
 enum : int {
   ERROR_CAMERA_IN_USE = 1,
   ERROR_MAX_CAMERAS_IN_USE = 2,
@@ -121,7 +121,7 @@ struct ACameraCaptureFailure {
   bool wasImageCaptured;
 };
 
-// Those that are null are not called.
+// Null pointers are not called.
 struct ACameraCaptureSession_captureCallbacks {
   void* context;
   void (*onCaptureStarted)(void* context, ACameraCaptureSession*, const ACaptureRequest*, int64_t timestamp);

@@ -44,7 +44,7 @@ const char* remedy_for(maq_status status) {
   }
 }
 
-// Runs a call of the session. What it throws becomes an Error that names the device.
+// Runs a call of the session. Its exceptions become an Error that names the device.
 template <class Body>
 auto guarded(const std::string& device, const char* what, maq_status fallback, Body&& body) {
   std::string text = "an exception of an unknown type";
@@ -93,11 +93,11 @@ class DepthAiCamera final : public Camera {
   const std::string& identity() const override { return features_.id; }
   const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
 
-  maq_control_info control(maq_control which) override {
+  maq_source_control_info control(maq_source_control which) override {
     std::lock_guard<std::mutex> lock(mutex_);
     return controls_.info(which);
   }
-  void set_control(maq_control which, double value) override {
+  void set_control(maq_source_control which, double value) override {
     std::lock_guard<std::mutex> session_lock(session_mutex_);
     if (session_ == nullptr) throw Error(MAQ_ERROR_DEVICE_LOST, name_, " is closed.");
     DepthAiControls changed;
@@ -154,7 +154,7 @@ class DepthAiCamera final : public Camera {
     }
     session_.reset();
     if (with_depth_ && without_depth_ > 0) {
-      log_.write(MAQ_LOG_INFO, name_, ": ", without_depth_, " of ", pictures_, " pictures came without depth");
+      log_.write(MAQ_LOG_INFO, name_, ": ", without_depth_, " of ", pictures_, " images came without depth");
     }
   }
 
@@ -167,7 +167,7 @@ class DepthAiCamera final : public Camera {
   // The nearest to the request that the device can do.
   DepthAiPlan agree(const DepthAiRequest& request) const {
     const bool has_size = request.width_px > 0 && request.height_px > 0;
-    // Of NV12, four pixels share a colour, and the link takes depth images of even size only.
+    // In NV12 four pixels share a colour, and the link takes depth images of even size only.
     const auto side = [](int wanted, int max) { return std::max(2, (max > 0 ? std::min(wanted, max) : wanted) & ~1); };
     DepthAiPlan plan;
     plan.width_px = side(has_size ? request.width_px : kDefaultCameraWidthPx, features_.width_px);
@@ -192,7 +192,7 @@ class DepthAiCamera final : public Camera {
   bool fill(int slot, DepthAiPair pair, CameraBuffer& buffer) {
     const auto step = int64_t(uint64_t(pair.colour.sequence) - uint64_t(last_device_sequence_));
     if (pictures_ > 0 && step <= 0 && pair.colour.timestamp_ns <= last_timestamp_ns_) return false;
-    // Where a device restarts its count, or leaps, the lost frames cannot be counted.
+    // If a device restarts its count, or leaps, lost frames cannot be counted.
     sequence_ += pictures_ == 0 ? 0 : (step >= 1 && step <= kMaxLostInARow ? uint32_t(step) : 1);
     last_device_sequence_ = pair.colour.sequence;
     // The device's clock is fitted to ours again and again, and may step back.
@@ -227,7 +227,7 @@ class DepthAiCamera final : public Camera {
   const std::string handle_;
   const std::string name_ = "DepthAI device " + handle_;
   const Log log_;
-  std::mutex session_mutex_;  // of session_, between the thread of wait() and those that set controls
+  std::mutex session_mutex_;  // guards session_ between wait() and threads that set controls
   std::unique_ptr<DepthAiSession> session_;
   std::shared_ptr<DepthAiInbox> inbox_;
   DepthAiFeatures features_;
@@ -235,11 +235,11 @@ class DepthAiCamera final : public Camera {
   std::optional<maq_intrinsics> intrinsics_;
   bool with_depth_ = false;
 
-  std::mutex mutex_;  // of slots_ and controls_
+  std::mutex mutex_;  // guards slots_ and controls_
   std::vector<Slot> slots_;
   DepthAiControls controls_;
 
-  // Of wait's thread alone.
+  // Used by the thread of wait() alone.
   int64_t last_device_sequence_ = 0, last_timestamp_ns_ = INT64_MIN;
   uint32_t sequence_ = 0;
   uint64_t pictures_ = 0, without_depth_ = 0;
@@ -255,7 +255,7 @@ bool is_ip_address(const std::string& text) {
   return std::count(text.begin(), text.end(), '.') == 3 && text.find_first_not_of("0123456789.") == std::string::npos;
 }
 
-// What to open a device by: the one whose id is `identity`, or, before there is one, that which `device` names.
+// Returns the name for opening a device: `identity`, or `device` before there is an identity.
 std::string choose(DepthAiDriver& driver, const std::string& device, const std::string& identity) {
   const DepthAiDevice* refused = nullptr;
   std::string there;

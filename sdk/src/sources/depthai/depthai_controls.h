@@ -11,13 +11,13 @@ class DepthAiControls {
   DepthAiControls() = default;
   DepthAiControls(const DepthAiFeatures& features, double fps);
 
-  // While the device chooses, what it chose for the newest picture is the value.
+  // While the device chooses, what it chose for the newest image is the value.
   void note(const DepthAiFrame& newest);
 
   // Throws MAQ_ERROR_UNSUPPORTED for what the device does not have.
-  maq_control_info info(maq_control which) const;
+  maq_source_control_info info(maq_source_control which) const;
   // Throws MAQ_ERROR_INVALID_ARGUMENT out of range, and what the session throws; then nothing has changed here.
-  void set(maq_control which, double value, DepthAiSession& session);
+  void set(maq_source_control which, double value, DepthAiSession& session);
 
  private:
   bool has_autofocus_ = false;

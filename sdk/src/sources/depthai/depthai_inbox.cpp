@@ -34,7 +34,7 @@ bool is_usable_colour(const DepthAiFrame& frame, const DepthAiPlan& plan) {
          frame.height_px == plan.height_px && has_its_bytes(frame);
 }
 
-// Of the picture's shape, and not larger: then it fits pixel by pixel, or is a smaller version.
+// Checks for the image's shape, and at most its size: then depth fits pixel by pixel, or is a smaller version.
 bool is_usable_depth(const DepthAiFrame& frame, const DepthAiPlan& plan) {
   if (!plan.with_depth || frame.format != MAQ_PIXEL_DEPTH16) return false;
   if (frame.width_px < 1 || frame.width_px > plan.width_px) return false;

@@ -19,10 +19,10 @@ class DepthAiInbox : public DepthAiReceiver {
   void receive_colour(DepthAiFrame frame) noexcept override;
   void receive_depth(DepthAiFrame frame) noexcept override;
 
-  // As those of DepthAiPairing.
+  // Like the functions of DepthAiPairing.
   std::optional<DepthAiPair> next(int64_t now_ns);
   int64_t due_ns();
-  // What waits is given up, what comes later is dropped.
+  // Releases waiting images and drops later ones.
   void close();
 
   // Readable when frames have come; also signalled by the camera, when a buffer is free again.

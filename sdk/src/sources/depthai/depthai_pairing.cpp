@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-// Depth comes some tens of milliseconds after its picture: the device computes it.
+// Depth comes some tens of milliseconds after its image: the device computes it.
 constexpr int64_t kMinWaitNs = 100'000'000;
 constexpr int kMaxWaitPeriods = 3;
 constexpr size_t kMaxWaiting = 16;

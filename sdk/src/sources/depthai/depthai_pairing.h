@@ -1,4 +1,4 @@
-// Pairs the pictures of a DepthAI device with their depth images: two streams that arrive apart become one.
+// Pairs the images of a DepthAI device with their depth images: two streams that arrive apart become one.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace maq {
 
-// A picture, with its depth where that came in time.
+// An image, with its depth where that came in time.
 struct DepthAiPair {
   DepthAiFrame colour;
   std::optional<DepthAiFrame> depth;
 };
 
 // Time decides, not the number: the cameras of a device count from where each of them began. The nearest depth image
-// that is at most half a frame period away is the picture's; of two that are as near, the one of the same number. Where
+// that is at most half a frame period away is the image's; of two that are as near, the one of the same number. Where
 // a device gives no times, equal numbers pair. All times are CLOCK_MONOTONIC.
 class DepthAiPairing {
  public:
@@ -26,7 +26,7 @@ class DepthAiPairing {
   void add_colour(DepthAiFrame frame, int64_t now_ns);
   void add_depth(DepthAiFrame frame, int64_t now_ns);
 
-  // The oldest picture, once its depth is there, cannot come any more, or is too late.
+  // The oldest image, once its depth is there, cannot come any more, or is too late.
   std::optional<DepthAiPair> next(int64_t now_ns);
   // When next() has something even if nothing is added; INT64_MAX for never.
   int64_t due_ns() const;
@@ -42,7 +42,7 @@ class DepthAiPairing {
 
   static Waiting waiting(DepthAiFrame frame, int64_t now_ns);
   void keep(std::deque<Waiting>& queue, Waiting entry) const;
-  // Depth of a later or an earlier picture.
+  // Depth of a later or an earlier image.
   bool is_past(const Waiting& depth, const Waiting& colour) const;
   bool is_before(const Waiting& depth, const Waiting& colour) const;
 

@@ -250,7 +250,7 @@ class Driver : public DepthAiDriver {
   std::vector<DepthAiDevice> list() override {
     return plain([] {
       std::vector<DepthAiDevice> devices;
-      // Those that cannot be opened too, to say why.
+      // Includes devices that cannot be opened, with the reason.
       for (const dai::DeviceInfo& info : dai::XLinkConnection::getAllConnectedDevices(X_LINK_ANY_STATE, false)) {
         DepthAiDevice device{info.getDeviceId(), info.name, chip_of(info.platform), MAQ_OK, ""};
         if (info.status == X_LINK_INSUFFICIENT_PERMISSIONS) {

@@ -1,5 +1,5 @@
-// What the SDK needs of a DepthAI device (an OAK camera of Luxonis), in its own types. depthai_session.cpp does it with
-// the vendor's library, in a library of its own, libmaquette_depthai.so; tests do it in memory.
+// The interface to a DepthAI device (an OAK camera of Luxonis), in the SDK's own types. depthai_session.cpp does it
+// with the vendor's library, in a library of its own, libmaquette_depthai.so; tests do it in memory.
 //
 // Everything a device says is a claim: DepthAiCamera checks it. Every call may throw a std::exception with a text.
 #pragma once
@@ -27,7 +27,7 @@ struct DepthAiDevice {
 
 struct DepthAiFeatures {
   std::string id;
-  // Of the colour camera; 0: not known.
+  // Values of the colour camera; 0: not known.
   int width_px = 0;
   int height_px = 0;
   double fps = 0;  // the fastest
@@ -39,11 +39,11 @@ struct DepthAiPlan {
   int width_px = 0;
   int height_px = 0;
   double fps = 0;
-  // With depth the device takes the distortion of the lens out of the picture: only then the two fit pixel by pixel.
+  // With depth the device takes the distortion of the lens out of the image: only then the two fit pixel by pixel.
   bool with_depth = false;
 };
 
-// Of the colour camera for pictures of a size, as the device was calibrated.
+// Returns the calibration of the colour camera for images of a size.
 struct DepthAiLens {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   // In OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, taux, tauy.
@@ -51,9 +51,9 @@ struct DepthAiLens {
   bool is_perspective = true;  // false: the coefficients are those of another model (fisheye)
 };
 
-// A picture or a depth image as it came, without a copy.
+// An image or a depth image as it came, without a copy.
 struct DepthAiFrame {
-  std::shared_ptr<const void> owner;  // of the bytes
+  std::shared_ptr<const void> owner;  // owner of the bytes
   const uint8_t* data = nullptr;
   size_t size_bytes = 0;
   std::optional<maq_pixel_format> format;  // nothing: one that this SDK does not know
@@ -63,7 +63,7 @@ struct DepthAiFrame {
   size_t uv_offset_bytes = 0;  // where the second plane of NV12 begins
   int64_t timestamp_ns = 0;    // CLOCK_MONOTONIC
   int64_t sequence = 0;
-  // What the camera was set to for this picture; 0: not known.
+  // Settings of the camera for this image; 0: not known.
   int exposure_us = 0;
   int gain_iso = 0;
   int focus = 0;
@@ -108,7 +108,7 @@ class DepthAiDriver {
   virtual std::unique_ptr<DepthAiSession> open(const std::string& device) = 0;
 };
 
-// What the library exports, a DepthAiDriver (core/module.h).
+// The export of the library, a DepthAiDriver (core/module.h).
 constexpr char kDepthAiSymbol[] = "maquette_depthai";
 
 }  // namespace maq

@@ -40,14 +40,14 @@ class ImageSource : public Source {
   const SourceInfo& info() const override { return info_; }
   const maq_intrinsics* intrinsics() const override { return intrinsics_ ? &*intrinsics_ : nullptr; }
 
-  NextFrame next(int64_t, Frame& frame) override {
+ private:
+  NextFrame read(int64_t, Frame& frame) override {
     if (delivered_) return NextFrame::kEnd;
     frame = std::move(image_);
     delivered_ = true;
     return NextFrame::kFrame;
   }
 
- private:
   Frame image_;
   SourceInfo info_;
   std::optional<maq_intrinsics> intrinsics_;

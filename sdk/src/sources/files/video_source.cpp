@@ -52,7 +52,8 @@ class VideoSource : public Source {
   bool can_seek() const override { return true; }
   void seek(int64_t time_ns) override { seek_to_ns_ = time_ns; }
 
-  NextFrame next(int64_t, Frame& frame) override {
+ private:
+  NextFrame read(int64_t, Frame& frame) override {
     if (seek_to_ns_) find(*std::exchange(seek_to_ns_, std::nullopt));
     while (std::exchange(is_ahead_, false) || read()) {
       if (asked_fps_ > 0) {
@@ -67,7 +68,6 @@ class VideoSource : public Source {
     return NextFrame::kEnd;
   }
 
- private:
   void open() {
     clip_ = file_codecs().open_clip(path_);
     if (clip_ != nullptr) return;
@@ -183,7 +183,7 @@ class VideoSource : public Source {
   double clip_fps_ = 0;
   double asked_fps_ = 0;
   int64_t promised_frames_ = -1;
-  // Of the frame that was decoded last.
+  // Time of the frame that was decoded last.
   int64_t index_ = -1;
   int64_t time_ns_ = -1;
   bool is_ahead_ = false;  // it is still to be delivered

@@ -108,7 +108,7 @@ void LibcameraCamera::make_slot(libcamera::FrameBuffer& buffer) {
   if (slot.mappings.size() == 1 && planes[0].offset == 0) slot.dma_buf = slot.mappings[0].fd.get();
 }
 
-// Where the plane begins. Its memory is mapped unless that of a plane before it was in the same file.
+// Returns the begin of the plane. Maps its memory unless an earlier plane in the same file has mapped it.
 const uint8_t* LibcameraCamera::map(Slot& slot, const libcamera::FrameBuffer::Plane& plane) {
   auto mapping = std::find_if(slot.mappings.begin(), slot.mappings.end(),
                               [&](const Mapping& other) { return other.fd.get() == plane.fd.get(); });
@@ -240,13 +240,13 @@ void LibcameraCamera::require_streaming() const {
   if (!streaming_) throw Error(MAQ_ERROR_DEVICE_LOST, label_, " is not open any more.");
 }
 
-maq_control_info LibcameraCamera::control(maq_control which) {
+maq_source_control_info LibcameraCamera::control(maq_source_control which) {
   std::lock_guard<std::mutex> lock(mutex_);
   require_streaming();
   return controls_.get(which);
 }
 
-void LibcameraCamera::set_control(maq_control which, double value) {
+void LibcameraCamera::set_control(maq_source_control which, double value) {
   std::lock_guard<std::mutex> lock(mutex_);
   require_streaming();
   controls_.set(which, value);

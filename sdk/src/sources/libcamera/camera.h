@@ -29,8 +29,8 @@ class LibcameraCamera final : public Camera {
 
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return identity_; }
-  maq_control_info control(maq_control which) override;
-  void set_control(maq_control which, double value) override;
+  maq_source_control_info control(maq_source_control which) override;
+  void set_control(maq_source_control which, double value) override;
   Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override;
   void give_back(int slot) override;
   int dma_buf(int slot) override { return slots_[size_t(slot)].dma_buf; }
@@ -48,7 +48,7 @@ class LibcameraCamera final : public Camera {
     libcamera::FrameBuffer* buffer = nullptr;
     std::vector<Mapping> mappings;  // one for each file
     PlaneView planes[2];
-    size_t size_bytes = 0;  // of a JPEG image at most, of pixels at least
+    size_t size_bytes = 0;  // maximum for a JPEG image, minimum for pixels
     int dma_buf = -1;
   };
 
@@ -74,10 +74,10 @@ class LibcameraCamera final : public Camera {
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
   LibcameraReceiver* receiver_ = nullptr;  // deletes itself
   bool started_ = false;
-  bool lost_ = false;  // of the thread that waits, and closes
+  bool lost_ = false;  // used by the thread that waits and closes
   std::atomic<bool> is_closed_{false};
 
-  std::mutex mutex_;  // of what follows, and of requests that are queued
+  std::mutex mutex_;  // guards the members below and queued requests
   bool streaming_ = false;
   LibcameraControls controls_;
 };

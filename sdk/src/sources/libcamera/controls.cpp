@@ -51,21 +51,21 @@ libcamera::ControlValue to_libcamera(const libcamera::ControlId& id, double valu
 
 }  // namespace
 
-// What a control is to libcamera, and the automatic that a value set by hand switches off.
+// The libcamera controls for a control, and the automatic mode that a manual value switches off.
 struct LibcameraControls::Known {
-  maq_control which;
+  maq_source_control which;
   const libcamera::ControlId& id;
   const libcamera::ControlId* automatic;
 };
 const LibcameraControls::Known LibcameraControls::kKnown[] = {
-    {MAQ_CONTROL_AUTO_EXPOSURE, controls::AeEnable, nullptr},
-    {MAQ_CONTROL_EXPOSURE, controls::ExposureTime, &controls::AeEnable},
-    {MAQ_CONTROL_GAIN, controls::AnalogueGain, &controls::AeEnable},
-    {MAQ_CONTROL_AUTO_FOCUS, controls::AfMode, nullptr},
-    {MAQ_CONTROL_FOCUS, controls::LensPosition, &controls::AfMode},
-    {MAQ_CONTROL_AUTO_WHITE_BALANCE, controls::AwbEnable, nullptr},
-    {MAQ_CONTROL_WHITE_BALANCE, controls::ColourTemperature, &controls::AwbEnable},
-    {MAQ_CONTROL_BRIGHTNESS, controls::Brightness, nullptr},
+    {MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, controls::AeEnable, nullptr},
+    {MAQ_SOURCE_CONTROL_EXPOSURE, controls::ExposureTime, &controls::AeEnable},
+    {MAQ_SOURCE_CONTROL_GAIN, controls::AnalogueGain, &controls::AeEnable},
+    {MAQ_SOURCE_CONTROL_AUTO_FOCUS, controls::AfMode, nullptr},
+    {MAQ_SOURCE_CONTROL_FOCUS, controls::LensPosition, &controls::AfMode},
+    {MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE, controls::AwbEnable, nullptr},
+    {MAQ_SOURCE_CONTROL_WHITE_BALANCE, controls::ColourTemperature, &controls::AwbEnable},
+    {MAQ_SOURCE_CONTROL_BRIGHTNESS, controls::Brightness, nullptr},
 };
 
 LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, std::string label)
@@ -75,13 +75,14 @@ LibcameraControls::LibcameraControls(const libcamera::ControlInfoMap& offered, s
   }
 }
 
-// What the camera says of the control; nothing when it does not have it.
-std::optional<maq_control_info> LibcameraControls::range(const libcamera::ControlInfoMap& offered, const Known& known) {
+// Returns the camera's information about the control; nothing when it does not have it.
+std::optional<maq_source_control_info> LibcameraControls::range(const libcamera::ControlInfoMap& offered,
+                                                                const Known& known) {
   const libcamera::ControlInfo* const control = find(offered, known.id);
   if (control == nullptr) return {};
   const auto min = number_of(control->min()), max = number_of(control->max());
   if (!min || !max || !(*min <= *max)) return {};
-  maq_control_info info{};
+  maq_source_control_info info{};
   info.min = *min;
   info.max = *max;
   info.step = known.id.type() == libcamera::ControlTypeFloat ? 0 : 1;
@@ -99,15 +100,15 @@ std::optional<maq_control_info> LibcameraControls::range(const libcamera::Contro
   return info;
 }
 
-const maq_control_info& LibcameraControls::get(maq_control which) const {
+const maq_source_control_info& LibcameraControls::get(maq_source_control which) const {
   for (const State& state : states_) {
     if (state.known->which == which) return state.info;
   }
-  throw Error(MAQ_ERROR_UNSUPPORTED, label_, " has no control ", int(which), " (maq_control).");
+  throw Error(MAQ_ERROR_UNSUPPORTED, label_, " has no control ", int(which), " (maq_source_control).");
 }
 
-void LibcameraControls::set(maq_control which, double value) {
-  const maq_control_info& info = get(which);
+void LibcameraControls::set(maq_source_control which, double value) {
+  const maq_source_control_info& info = get(which);
   if (!(value >= info.min && value <= info.max)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Control ", int(which), " of ", label_, " goes from ", info.min, " to ",
                 info.max, ", not to ", value, ".");

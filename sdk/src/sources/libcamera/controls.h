@@ -16,12 +16,12 @@ namespace maq {
 class LibcameraControls {
  public:
   LibcameraControls() = default;
-  // Of those that the camera offers. `label` begins error texts.
+  // The controls that the camera offers. `label` begins error texts.
   LibcameraControls(const libcamera::ControlInfoMap& offered, std::string label);
 
-  // As those of maq::Camera.
-  const maq_control_info& get(maq_control which) const;
-  void set(maq_control which, double value);
+  // Like the functions of maq::Camera.
+  const maq_source_control_info& get(maq_source_control which) const;
+  void set(maq_source_control which, double value);
 
   // Puts the setting that has waited longest into the request's list.
   void take_setting(libcamera::ControlList& request);
@@ -32,7 +32,7 @@ class LibcameraControls {
   struct Known;
   struct State {
     const Known* known;
-    maq_control_info info;
+    maq_source_control_info info;
   };
   struct Setting {
     unsigned int id;
@@ -40,7 +40,7 @@ class LibcameraControls {
   };
   static const Known kKnown[];
 
-  static std::optional<maq_control_info> range(const libcamera::ControlInfoMap& offered, const Known& known);
+  static std::optional<maq_source_control_info> range(const libcamera::ControlInfoMap& offered, const Known& known);
   void push(State& state, double value);
 
   std::string label_;

@@ -68,7 +68,7 @@ bool propose(libcamera::CameraConfiguration& configuration, const KnownFormat& k
 std::unique_ptr<libcamera::CameraConfiguration> libcamera_configuration(libcamera::Camera& camera,
                                                                         const std::string& label) {
   auto configuration = camera.generateConfiguration({libcamera::StreamRole::Viewfinder});
-  if (configuration == nullptr || configuration->empty()) refuse_camera(label, "offers no stream of pictures");
+  if (configuration == nullptr || configuration->empty()) refuse_camera(label, "offers no stream of images");
   return configuration;
 }
 

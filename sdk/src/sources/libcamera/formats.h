@@ -12,8 +12,8 @@
 
 namespace maq {
 
-// Acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no pictures; `label` ("libcamera:0") begins
-// the sentence.
+// The camera may be acquired or not. Throws MAQ_ERROR_UNSUPPORTED for a camera that offers no images; `label`
+// ("libcamera:0") begins the sentence.
 std::unique_ptr<libcamera::CameraConfiguration> libcamera_configuration(libcamera::Camera& camera,
                                                                         const std::string& label);
 
@@ -25,7 +25,7 @@ std::vector<CameraMode> libcamera_modes(const libcamera::CameraConfiguration& co
 void choose_libcamera_format(libcamera::CameraConfiguration& configuration, const CameraRequest& request, int buffers,
                              const std::string& label);
 
-// What the camera agreed to, checked before it is believed, and the bytes of a line.
+// The validated configuration of the camera, and the bytes of a line.
 struct LibcameraFormat {
   CameraFormat format;
   size_t stride_bytes = 0;

@@ -47,8 +47,8 @@ struct ExitGuard {
   ~ExitGuard() { [[maybe_unused]] const bool kept = library().mutex.try_lock_for(kExitTimeout); }
 } exit_guard;
 
-// libcamera waits without end for a thread of its own that does not start, and ends the process where it gets no
-// descriptor or memory. What it starts with is tried before.
+// libcamera waits without end for a thread of its own that does not start, and ends the process without a descriptor or
+// memory. These resources are checked before it starts.
 void require_means_to_start() {
   constexpr size_t kBytes = size_t(96) << 20;
   constexpr size_t kThreads = 4;

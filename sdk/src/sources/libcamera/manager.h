@@ -14,7 +14,7 @@ namespace maq {
 // Held while cameras are opened, closed and listed: a manager must be destroyed before the next starts, and a camera
 // released before it is acquired again. Throws MAQ_ERROR_BUSY when another camera hangs in it.
 std::unique_lock<std::timed_mutex> lock_libcamera();
-// The same, for as long as it takes.
+// Waits for as long as it takes.
 std::unique_lock<std::timed_mutex> lock_libcamera_to_close();
 
 // Made and destroyed while that mutex is held.

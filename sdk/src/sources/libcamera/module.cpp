@@ -1,4 +1,4 @@
-// What libmaquette_libcamera.so exports.
+// The export of libmaquette_libcamera.so.
 #include <libcamera/property_ids.h>
 
 #include "core/error.h"

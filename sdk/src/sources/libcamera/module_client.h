@@ -12,7 +12,7 @@
 
 namespace maq {
 
-// What the module exports.
+// The export of the module.
 class LibcameraCameras {
  public:
   virtual ~LibcameraCameras() = default;

@@ -16,7 +16,7 @@ namespace maq {
 class LibcameraMailbox {
  public:
   struct Item {
-    int slot = -1;          // of a request that came back; -1: the camera is lost
+    int slot = -1;          // slot of a request that came back; -1: the camera is lost
     const char* lost = "";  // how
   };
 

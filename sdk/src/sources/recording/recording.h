@@ -20,7 +20,7 @@
 namespace maq {
 
 struct RecordingInfo {
-  std::string source;  // what was recorded: a URI
+  std::string source;  // the URI of the recorded source
   double fps = 0;      // 0: not known
   std::optional<maq_intrinsics> intrinsics;
 };
@@ -33,7 +33,7 @@ struct RecordingEntry {
 class RecordingWriter {
  public:
   // Makes the file, which must not be there yet. `jpeg_quality` 0 keeps pixels as they are, 1 to 100 compresses them;
-  // what came from a camera as JPEG is kept as it came in both cases. Predicted frames are kept, with a mark, where
+  // JPEG images of a camera are never changed. Predicted frames are kept, with a mark, where
   // `keeps_predicted` is set. Throws MAQ_ERROR_UNWRITABLE.
   RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality, bool keeps_predicted = false);
   // Without finish() the file has no index; without finish() and a frame it is removed.
@@ -70,7 +70,7 @@ struct RecordedFrame {
 
 class RecordingReader {
  public:
-  // Throws what open_file() throws, MAQ_ERROR_UNREADABLE (not a recording, or no whole frame in it), and
+  // Throws the errors of open_file(), MAQ_ERROR_UNREADABLE (not a recording, or no whole frame in it), and
   // MAQ_ERROR_UNSUPPORTED (of a newer version). A recording without a valid index is searched for frames; the log says
   // so.
   RecordingReader(std::string path, const Log& log);
@@ -78,7 +78,7 @@ class RecordingReader {
   const RecordingInfo& info() const { return info_; }
   size_t frame_count() const { return entries_.size(); }
   bool has_index() const { return has_index_; }
-  // As the camera gave it, later from frame to frame.
+  // The camera's timestamp, which increases from frame to frame.
   int64_t timestamp_ns(size_t index) const { return entries_[index].timestamp_ns; }
   // From the frame's head alone; nothing when that was changed.
   std::optional<RecordedFrame> describe(size_t index) const;
@@ -104,7 +104,7 @@ class RecordingReader {
 };
 
 // For "rec:take.maqrec": the frames at their times, from `from` to `to` seconds, with seek(). next() throws
-// MAQ_ERROR_UNREADABLE for a damaged frame, and goes on after it. Throws what RecordingReader throws.
+// MAQ_ERROR_UNREADABLE for a damaged frame, and goes on after it. Throws the errors of RecordingReader.
 std::unique_ptr<Source> open_recording_source(SourceUri uri, const Log& log);
 
 }  // namespace maq

@@ -11,7 +11,7 @@ inline constexpr uint32_t kRecordingVersion = 1;
 inline constexpr uint32_t kFrameMagic = 0x4651414d;  // "MAQF"
 inline constexpr uint32_t kJpegEncoding = 100;       // beside the values of maq_pixel_format
 inline constexpr uint32_t kMaxHeadBytes = 1 << 20;
-inline constexpr uint64_t kMaxIndexBytes = 1 << 28;               // of 16 million frames: six days at 30 a second
+inline constexpr uint64_t kMaxIndexBytes = 1 << 28;               // for 16 million frames: six days at 30 a second
 inline constexpr int64_t kMaxHorizonUs = 4'000'000'000;           // longer ones are written as that
 inline constexpr int64_t kMaxSpanNs = 1'000'000'000'000'000'000;  // from the first frame to the last: 31 years
 
@@ -29,13 +29,13 @@ static_assert(sizeof(RecordingHead) == 24);
 // Before the pixels of each frame: rows without padding, planes one after the other, then those of the depth image.
 struct FrameHead {
   uint32_t magic;
-  uint32_t head_check;  // of what follows, to the end of this struct
+  uint32_t head_check;  // checksum of the rest of this struct
   int64_t timestamp_ns;
   uint64_t sequence;
   uint32_t encoding;
   int32_t width_px, height_px;
   int32_t depth_width_px, depth_height_px;
-  uint32_t predicted_us;  // of a predicted frame 1 and its horizon in microseconds, of others 0
+  uint32_t predicted_us;  // a predicted frame: 1 plus its horizon in microseconds; others: 0
   uint64_t picture_bytes;
   uint64_t payload_check;
 };

@@ -128,7 +128,7 @@ bool RecordingReader::read_index() {
   if (std::memcmp(tail.magic, kRecordingEnd, sizeof tail.magic) != 0) return false;
   if (tail.index_offset < first_offset_ || tail.index_offset > end) return false;
   const uint64_t index_bytes = end - tail.index_offset;
-  // A file with a hole has any length. What is over the limit is searched for frames, like a file without an index.
+  // A file with a hole has any length. A file over the limit is searched for frames, like one without an index.
   if (index_bytes % sizeof(RecordingEntry) != 0 || index_bytes > kMaxIndexBytes) return false;
   std::vector<RecordingEntry> entries(index_bytes / sizeof(RecordingEntry));
   if (!read_at(tail.index_offset, entries.data(), index_bytes)) return false;

@@ -31,7 +31,7 @@ class RecordingSource : public Source {
     info_.width_px = width_px_ > 0 ? width_px_ : frame->width_px;
     info_.height_px = height_px_ > 0 ? height_px_ : frame->height_px;
     first_sequence_ = frame->sequence;
-    // What the camera promised is not always what it gave.
+    // The real rate may differ from the camera's announced rate.
     const double lasted_s = double(time_ns(end_ - 1) - time_ns(first_)) / 1e9;
     const double fps = lasted_s > 0 ? double(end_ - 1 - first_) / lasted_s : reader_.info().fps;
     const bool thinned = asked_fps_ > 0 && asked_fps_ < fps;
@@ -40,7 +40,7 @@ class RecordingSource : public Source {
   }
 
   const SourceInfo& info() const override { return info_; }
-  // As it was recorded: for pictures of another size it does not hold.
+  // The recorded intrinsics; unknown for images of another size.
   const maq_intrinsics* intrinsics() const override {
     return reader_.info().intrinsics && width_px_ == 0 ? &*reader_.info().intrinsics : nullptr;
   }
@@ -51,7 +51,8 @@ class RecordingSource : public Source {
     next_due_ns_ = 0;
   }
 
-  NextFrame next(int64_t, Frame& frame) override {
+ private:
+  NextFrame read(int64_t, Frame& frame) override {
     while (next_ < end_ && asked_fps_ > 0 && time_ns(next_) < next_due_ns_) ++next_;
     if (next_ >= end_) return NextFrame::kEnd;
     const size_t index = next_++;  // a damaged one is reported once
@@ -74,7 +75,6 @@ class RecordingSource : public Source {
     return NextFrame::kFrame;
   }
 
- private:
   int64_t time_ns(size_t index) const { return reader_.timestamp_ns(index) - reader_.timestamp_ns(0); }
 
   size_t at_or_after(int64_t wanted_ns) const {

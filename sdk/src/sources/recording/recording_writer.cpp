@@ -33,7 +33,7 @@ std::string head_json(const RecordingInfo& info) {
                            {"fy_px", from.fy_px},          {"cx_px", from.cx_px},         {"cy_px", from.cy_px},
                            {"distortion", from.distortion}};
   }
-  // A name that is no UTF-8 is no reason not to record.
+  // A name that is not UTF-8 must not prevent a recording.
   return head.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -82,7 +82,7 @@ void RecordingWriter::append(const void* header, size_t header_bytes, const void
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) {
       const int error = written < 0 ? errno : ENOSPC;
-      // What was begun goes, so that the file ends with a whole frame and the next try begins there.
+      // Removes the incomplete frame, so that the file ends with a whole frame and the next try begins there.
       [[maybe_unused]] const bool cut =
           ::ftruncate(file_.get(), off_t(size_bytes_)) == 0 && ::lseek(file_.get(), off_t(size_bytes_), SEEK_SET) >= 0;
       throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be written: ", std::strerror(error), ". The ", entries_.size(),
@@ -143,7 +143,7 @@ void RecordingWriter::add(const Frame& frame) {
   head.payload_check = XXH3_64bits(payload_.data(), payload_.size());
   constexpr size_t kChecked = offsetof(FrameHead, timestamp_ns);
   head.head_check = uint32_t(XXH3_64bits(&head.timestamp_ns, sizeof head - kChecked));
-  entries_.reserve(entries_.size() + 1);  // what is written is also in the index
+  entries_.reserve(entries_.size() + 1);  // a written frame must also be in the index
   const uint64_t offset = size_bytes_;
   append(&head, sizeof head, payload_.data(), payload_.size());
   entries_.push_back({offset, frame.timestamp_ns});

@@ -14,7 +14,7 @@ constexpr int kFatteningPx = 2;
 constexpr double kMinDisparityPx = 0.5;
 
 constexpr double kMinErrorM = 0.001, kErrorOfSquareM = 0.0005;  // metres, and metres for each square metre of range
-constexpr double kJump = 0.05;                                  // of the nearer depth
+constexpr double kJump = 0.05;                                  // share of the nearer depth
 constexpr double kHoleFraction = 0.15, kMixedFraction = 0.6, kMaxMixture = 0.5;
 constexpr double kRangeM = 6;
 
@@ -61,7 +61,7 @@ void DepthNoise::see_by_stereo(const SolidsPicture& picture, float* metres) {
     errors_[pixel] = float(normal(pixel));
   }
   for (int y = 0; y < height; ++y) {
-    // Of the other camera, to the right, the leftmost column that a pixel farther right is at: what lies right of it is
+    // In the other camera, to the right, the leftmost column that a pixel farther right is at: what lies right of it is
     // covered there.
     double covered_from = width;
     for (int x = width - 1; x >= 0; --x) {

@@ -1,4 +1,4 @@
-// What depth cameras make of exact depth: errors, and pixels without depth. Pixel by pixel a function of the seed, the
+// Models the errors of depth cameras: noise, and pixels without depth. Pixel by pixel a function of the seed, the
 // frame and the depth alone, with the same bits on every processor.
 #pragma once
 
@@ -16,7 +16,7 @@ class DepthNoise {
   // another name.
   DepthNoise(const std::string& name, uint64_t seed);
 
-  // Of a picture that was drawn exactly.
+  // Applies the noise to exact depth.
   void apply(const SolidsPicture& picture, uint64_t frame, float* metres);
 
  private:
@@ -26,7 +26,7 @@ class DepthNoise {
   void see_by_light(const SolidsPicture& picture, float* metres);
   // From 0 to below 1, for the `use`th time at that pixel.
   double uniform(size_t pixel, uint64_t use) const;
-  // Of mean 0 and variance 1, within 3.5 of 0.
+  // Returns a number of mean 0 and variance 1, within 3.5 of 0.
   double normal(size_t pixel) const;
 
   Kind kind_;

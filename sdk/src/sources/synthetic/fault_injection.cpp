@@ -20,7 +20,7 @@ using std::chrono::nanoseconds;
 
 constexpr int64_t kIndefinitely = INT64_MAX;
 
-// What outlives a camera that is lost and opened again: each event happens once, and the random numbers continue.
+// State that outlives a camera that is lost and opened again: each event happens once, and the random numbers continue.
 struct FaultTimeline {
   explicit FaultTimeline(const FaultPlan& of) : plan(of), random(of.seed) {}
 
@@ -52,8 +52,8 @@ class FaultyCamera : public Camera {
   const CameraFormat& format() const override { return camera_->format(); }
   const std::string& identity() const override { return camera_->identity(); }
   const maq_intrinsics* intrinsics() const override { return camera_->intrinsics(); }
-  maq_control_info control(maq_control which) override { return camera_->control(which); }
-  void set_control(maq_control which, double value) override { camera_->set_control(which, value); }
+  maq_source_control_info control(maq_source_control which) override { return camera_->control(which); }
+  void set_control(maq_source_control which, double value) override { camera_->set_control(which, value); }
   void seek(int64_t time_ns) override { camera_->seek(time_ns); }
   void close() override { camera_->close(); }
   int dma_buf(int slot) override { return slot < kOwnSlots ? camera_->dma_buf(slot) : -1; }
@@ -148,11 +148,11 @@ class FaultyCamera : public Camera {
   std::shared_ptr<Camera> camera_;
   std::shared_ptr<FaultTimeline> timeline_;
   Clock::time_point stalled_until_ = Clock::time_point::min();
-  std::mutex mutex_;  // of copies_
+  std::mutex mutex_;  // guards copies_
   std::vector<Copy> copies_;
 };
 
-// Of "2s" or "20ms".
+// Parses "2s" or "20ms".
 std::optional<int64_t> duration_ns(const std::string& text) {
   size_t digits = text.find_first_not_of("0123456789.");
   if (digits == 0 || digits == std::string::npos) return {};

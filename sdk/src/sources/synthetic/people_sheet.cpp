@@ -24,7 +24,7 @@ class MaskReader {
 
   // `row` and `above` have a 0 before and after their `width` values.
   void read_row(const uint8_t* above, int width, uint8_t* row) {
-    static constexpr uint8_t kKind[] = {0, 1, 1, 1, 2};  // of a value: nothing, a part, all
+    static constexpr uint8_t kKind[] = {0, 1, 1, 1, 2};  // kind of a value: nothing, a part, all
     for (int x = 1; x <= width; ++x) {
       const int context = ((row[x - 1] * 5 + above[x]) * 3 + kKind[above[x - 1]]) * 3 + kKind[above[x + 1]];
       row[x] = read_value(&probabilities_[size_t(context) * 4]);

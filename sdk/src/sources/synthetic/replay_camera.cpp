@@ -16,7 +16,7 @@ namespace {
 using Clock = MonotonicClock;
 using std::chrono::nanoseconds;
 
-constexpr double kStillFps = 30;  // of a single image, which is repeated
+constexpr double kStillFps = 30;  // rate of a single image, which is repeated
 constexpr double kMaxNs = 1e18;   // 31 years: sums of a few of these fit
 
 nanoseconds limited_ns(double ns) { return nanoseconds(int64_t(std::min(ns, kMaxNs))); }
@@ -190,7 +190,7 @@ class ReplayCamera : public Camera {
   nanoseconds max_delay_;
   Frame ahead_;  // read before it is due
   std::optional<ReplaySchedule::Next> next_;
-  std::mutex mutex_;  // of the rest
+  std::mutex mutex_;  // guards the rest
   std::vector<Slot> slots_;
   size_t last_slot_ = 0;
   std::optional<int64_t> seek_to_ns_;

@@ -57,7 +57,7 @@ class EdgeCollector {
 
   // `middle` lies on the edge, as the middle of a chord does not.
   void add_if_edge(const SolidsEdge& edge, const Vector3& middle) {
-    // Of four quarters of the space around it: one is solid (convex), or one is free (concave).
+    // The four quarters of the space around an edge: one is solid (convex), or one is free (concave).
     int solid_quarters = 0, last_solid = 0, last_free = 0;
     for (int quarter = 0; quarter < 4; ++quarter) {
       const Vector3 point =
@@ -157,7 +157,7 @@ class EdgeInView {
   void add_visible(std::vector<VisibleSolidsEdge>& parts) const {
     double begin = 0, end = 1;
     if (!faces_camera_ || !clip(begin, end)) return;
-    // Steps of the same length in the picture.
+    // Steps of the same length in the image.
     const Vector3 a = point(begin), b = point(end);
     const double across = a[0] / a[2] - b[0] / b[2], down = a[1] / a[2] - b[1] / b[2];
     const int steps = 2 + int(4 * picture_.focal_px() * std::sqrt(across * across + down * down));
@@ -184,7 +184,7 @@ class EdgeInView {
  private:
   Vector3 point(double at) const { return from_ + at * (to_ - from_); }
 
-  // To what lies in front of the camera and between the borders of the picture.
+  // Clips to the part in front of the camera and between the borders of the image.
   bool clip(double& begin, double& end) const {
     constexpr double kNear = 1e-3;
     const double focal = picture_.focal_px(), x = picture_.centre_x_px(), y = picture_.centre_y_px();

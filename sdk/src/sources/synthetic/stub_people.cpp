@@ -65,7 +65,7 @@ StubPeople::StubPeople(int count, uint64_t seed, int width_px, int height_px) : 
     walker.row = (first_row + i) % kPeople;
     walker.height_px = std::max(4, int(height_px * (0.45 + 0.4 * nearness)));
     walker.feet_y_px = height_px * (0.72 + 0.24 * nearness);
-    // People begin spread over the picture, so that the first frame already shows them all.
+    // People begin spread over the image, so that the first frame already shows them all.
     walker.start_x_px = width_px * (i + dice.between(0.3, 0.7)) / count;
     const bool to_the_left = dice.below(2) == 1;
     walker.cycles_s = dice.between(0.7, 1.0);

@@ -20,10 +20,10 @@ class StubPeople {
 
  private:
   struct Walker {
-    int row = 0;                   // of the sheet: which person
-    int height_px = 0;             // of the whole tile as drawn
+    int row = 0;                   // row of the sheet: which person
+    int height_px = 0;             // height of the whole painted tile
     double feet_y_px = 0;          // the nearer, the lower and the larger
-    double start_x_px = 0;         // of the tile's centre at time 0
+    double start_x_px = 0;         // centre of the tile at time 0
     double speed_px_s = 0;         // negative: to the left
     double phase_frames = 0;       // where in the walk cycle at time 0
     double cycles_s = 0;           // walk cycles a second

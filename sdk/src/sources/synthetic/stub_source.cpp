@@ -103,7 +103,8 @@ class StubSource : public Source {
     index_ = int64_t(std::min(index, double(info_.frame_count < 0 ? max_frames_ : info_.frame_count)));
   }
 
-  NextFrame next(int64_t, Frame& frame) override {
+ private:
+  NextFrame read(int64_t, Frame& frame) override {
     if (index_ == info_.frame_count) return NextFrame::kEnd;
     const double time_s = double(index_) / info_.fps;
     if (solids_ != nullptr) {
@@ -122,7 +123,6 @@ class StubSource : public Source {
     return NextFrame::kFrame;
   }
 
- private:
   SourceInfo info_;
   std::unique_ptr<StubPeople> people_;
   std::unique_ptr<StubSolids> solids_;

@@ -9,7 +9,7 @@
 
 namespace maq {
 
-// stub:people (rendered people who walk through the picture), stub:pattern (moving colour bars) and stub:solids (depth
+// stub:people (rendered people who walk through the image), stub:pattern (moving colour bars) and stub:solids (depth
 // of solids of known size).
 std::unique_ptr<Source> open_stub_source(SourceUri uri);
 

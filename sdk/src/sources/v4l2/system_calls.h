@@ -12,7 +12,7 @@ class SystemCalls {
  public:
   virtual ~SystemCalls() = default;
 
-  // As the calls of these names: -1 (mmap: MAP_FAILED) and errno when they fail. mmap is shared, to read and write.
+  // Like the calls of these names: -1 (mmap: MAP_FAILED) and errno when they fail. mmap is shared, to read and write.
   virtual int open(const char* path, int flags);
   virtual int close(int fd);
   virtual int ioctl(int fd, unsigned long request, void* argument);
@@ -24,7 +24,7 @@ class SystemCalls {
   // terminal, a disk or a tape.
   virtual bool is_other_thing(const char* path);
 
-  // Those of the system.
+  // Returns the calls of the system.
   static SystemCalls& real();
 };
 

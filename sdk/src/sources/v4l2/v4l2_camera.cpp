@@ -29,7 +29,7 @@ namespace {
 constexpr int64_t kSecondNs = 1000000000;
 constexpr int64_t kMaxStampAgeNs = 10 * kSecondNs;
 
-// When the driver says that the picture was taken. When it arrived, where that cannot be: a stamp of another clock, in
+// When the driver says that the image was taken. When it arrived, where that cannot be: a stamp of another clock, in
 // the future, or older than frames in a queue become.
 int64_t time_of(const v4l2_buffer& filled) {
   const int64_t now = monotonic_ns();
@@ -68,8 +68,12 @@ class V4l2Camera final : public Camera {
   const CameraFormat& format() const override { return format_; }
   const std::string& identity() const override { return identity_; }
 
-  maq_control_info control(maq_control which) override { return read_v4l2_control(*open_device(), which); }
-  void set_control(maq_control which, double value) override { write_v4l2_control(*open_device(), which, value); }
+  maq_source_control_info control(maq_source_control which) override {
+    return read_v4l2_control(*open_device(), which);
+  }
+  void set_control(maq_source_control which, double value) override {
+    write_v4l2_control(*open_device(), which, value);
+  }
 
   Event wait(int wake_fd, int timeout_ms, CameraBuffer& buffer, std::string& reason) override {
     if (const int error = queue_error_) return lost("VIDIOC_QBUF", error, reason);
@@ -116,7 +120,7 @@ class V4l2Camera final : public Camera {
   int dma_buf(int index) override {
     std::lock_guard<std::mutex> lock(mutex_);
     Slot& slot = slots_[size_t(index)];
-    // The app could not know where in a dma-buf the picture begins, or which is the other one.
+    // The app could not know where in a dma-buf the image begins, or which is the other one.
     if (known_->memory_planes != 1 || slot.begins_at != 0) return -1;
     if (slot.dma_buf < 0 && device_ != nullptr) {
       v4l2_exportbuffer request{};
@@ -147,7 +151,7 @@ class V4l2Camera final : public Camera {
   };
   struct Slot {
     Mapping planes[2];
-    size_t begins_at = 0;  // the picture that it holds, in bytes from its beginning
+    size_t begins_at = 0;  // the image that it holds, in bytes from its beginning
     int dma_buf = -1;
     bool is_held = false;  // until give_back()
   };
@@ -189,7 +193,7 @@ class V4l2Camera final : public Camera {
     return request;
   }
 
-  // What the driver answered, by either interface.
+  // The driver's answer, by either interface.
   struct Answer {
     int width_px, height_px;
     uint32_t fourcc;
@@ -209,7 +213,8 @@ class V4l2Camera final : public Camera {
     return {int(pix.width), int(pix.height), pix.pixelformat, 1, {pix.bytesperline, pix.bytesperline}};
   }
 
-  // Of all formats that both sides know, the one nearest to the wanted size, then fast enough, then cheapest to use.
+  // Chooses among the formats that both sides know the one nearest to the wanted size, then fast enough, then cheapest
+  // to use.
   void negotiate(const CameraRequest& request) {
     const int width = request.width_px > 0 ? request.width_px : kDefaultCameraWidthPx;
     const int height = request.height_px > 0 ? request.height_px : kDefaultCameraHeightPx;
@@ -227,7 +232,7 @@ class V4l2Camera final : public Camera {
       if (known == nullptr || (!request.format.empty() && request.format != name)) continue;
       const bool shows_depth = is_depth(known->pixels);
       offers_depth = offers_depth || shows_depth;
-      // Who wants pictures has no use for depth, so that has to be asked for.
+      // Depth must be requested: most apps want colour images.
       if (shows_depth && request.format.empty()) continue;
       v4l2_format tried = format_request(*known, width, height);
       if (device_->call(VIDIOC_TRY_FMT, &tried) != 0) {
@@ -244,7 +249,7 @@ class V4l2Camera final : public Camera {
     if (choices.empty()) {
       device_->fail(concatenate("offers ", offered.empty() ? "no format" : offered, ", but ",
                                 !request.format.empty() ? "not " + request.format
-                                : offers_depth          ? "none of them is a picture; open depth with format=Z16"
+                                : offers_depth          ? "all of them are depth; open depth with format=Z16"
                                                         : "none of them is understood"),
                     EINVAL);
     }
@@ -386,10 +391,10 @@ class V4l2Camera final : public Camera {
   const V4l2Format* known_ = nullptr;
   CameraFormat format_;
   double depth_unit_m_ = kMillimetre;
-  size_t stride_bytes_[2] = {};  // of each plane of the image
-  size_t memory_bytes_[2] = {};  // that a picture takes of each plane of memory
+  size_t stride_bytes_[2] = {};  // stride of each plane of the image
+  size_t memory_bytes_[2] = {};  // memory of an image in each plane
   std::vector<Slot> slots_;
-  std::mutex mutex_;  // of device_, streaming_, is_held and dma_buf, between wait's thread and others
+  std::mutex mutex_;  // guards device_, streaming_, is_held and dma_buf
   bool streaming_ = false;
   std::atomic<int> queue_error_{0};
 };

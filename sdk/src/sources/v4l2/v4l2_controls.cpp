@@ -14,31 +14,31 @@ namespace maq {
 namespace {
 
 struct Control {
-  maq_control which;
+  maq_source_control which;
   const char* name;
   uint32_t id;
-  uint32_t automatic_id;  // of what chooses it, and is switched off first; 0: nothing does
-  double unit;            // of the driver's numbers, in those of the API
+  uint32_t automatic_id;  // id of its automatic mode, which is switched off first; 0: none
+  double unit;            // factor from the driver's numbers to the API's
   const char* unit_name;
 };
 const Control kControls[] = {
-    {MAQ_CONTROL_AUTO_EXPOSURE, "automatic exposure", V4L2_CID_EXPOSURE_AUTO, 0, 1, ""},
-    {MAQ_CONTROL_EXPOSURE, "exposure", V4L2_CID_EXPOSURE_ABSOLUTE, V4L2_CID_EXPOSURE_AUTO, 100, " microseconds"},
-    {MAQ_CONTROL_GAIN, "gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN, 1, ""},
-    {MAQ_CONTROL_AUTO_FOCUS, "automatic focus", V4L2_CID_FOCUS_AUTO, 0, 1, ""},
-    {MAQ_CONTROL_FOCUS, "focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO, 1, ""},
-    {MAQ_CONTROL_AUTO_WHITE_BALANCE, "automatic white balance", V4L2_CID_AUTO_WHITE_BALANCE, 0, 1, ""},
-    {MAQ_CONTROL_WHITE_BALANCE, "white balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE, 1,
-     " kelvin"},
-    {MAQ_CONTROL_BRIGHTNESS, "brightness", V4L2_CID_BRIGHTNESS, 0, 1, ""},
+    {MAQ_SOURCE_CONTROL_AUTO_EXPOSURE, "automatic exposure", V4L2_CID_EXPOSURE_AUTO, 0, 1, ""},
+    {MAQ_SOURCE_CONTROL_EXPOSURE, "exposure", V4L2_CID_EXPOSURE_ABSOLUTE, V4L2_CID_EXPOSURE_AUTO, 100, " microseconds"},
+    {MAQ_SOURCE_CONTROL_GAIN, "gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN, 1, ""},
+    {MAQ_SOURCE_CONTROL_AUTO_FOCUS, "automatic focus", V4L2_CID_FOCUS_AUTO, 0, 1, ""},
+    {MAQ_SOURCE_CONTROL_FOCUS, "focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO, 1, ""},
+    {MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE, "automatic white balance", V4L2_CID_AUTO_WHITE_BALANCE, 0, 1, ""},
+    {MAQ_SOURCE_CONTROL_WHITE_BALANCE, "white balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE,
+     1, " kelvin"},
+    {MAQ_SOURCE_CONTROL_BRIGHTNESS, "brightness", V4L2_CID_BRIGHTNESS, 0, 1, ""},
 };
-constexpr Control kAutomaticGain{MAQ_CONTROL_GAIN, "automatic gain", V4L2_CID_AUTOGAIN, 0, 1, ""};
+constexpr Control kAutomaticGain{MAQ_SOURCE_CONTROL_GAIN, "automatic gain", V4L2_CID_AUTOGAIN, 0, 1, ""};
 
-// What the driver says of a control, checked.
+// The driver's checked information about a control.
 struct Range {
   int64_t min, max, step, default_value;
   bool is_read_only;
-  // Of an automatic: what switches it on and off.
+  // For an automatic mode: the values that switch it on and off.
   int64_t on, off;
 };
 
@@ -140,11 +140,11 @@ void switch_automatic(const V4l2Device& device, const Control& automatic, bool o
   if (is_on != on) set(device, automatic, *range, on ? range->on : range->off);
 }
 
-const Control& entry(maq_control which) {
+const Control& entry(maq_source_control which) {
   for (const Control& control : kControls) {
     if (control.which == which) return control;
   }
-  throw Error(MAQ_ERROR_UNSUPPORTED, "There is no control ", int(which), " (maq_control).");
+  throw Error(MAQ_ERROR_UNSUPPORTED, "There is no control ", int(which), " (maq_source_control).");
 }
 
 const Control& automatic_of(const Control& control) {
@@ -155,8 +155,8 @@ const Control& automatic_of(const Control& control) {
 }
 
 // In the units of the API, all but the value.
-maq_control_info info_of(const Control& control, const Range& range) {
-  if (control.which == MAQ_CONTROL_AUTO_EXPOSURE) {
+maq_source_control_info info_of(const Control& control, const Range& range) {
+  if (control.which == MAQ_SOURCE_CONTROL_AUTO_EXPOSURE) {
     return {0,
             range.off < 0 ? 1.0 : 0.0,
             range.on < 0 ? 0.0 : 1.0,
@@ -174,26 +174,27 @@ maq_control_info info_of(const Control& control, const Range& range) {
 
 }  // namespace
 
-maq_control_info read_v4l2_control(const V4l2Device& device, maq_control which) {
+maq_source_control_info read_v4l2_control(const V4l2Device& device, maq_source_control which) {
   const Control& control = entry(which);
   const auto range = find_range(device, control);
   if (!range) refuse_missing(device, control);
-  maq_control_info info = info_of(control, *range);
+  maq_source_control_info info = info_of(control, *range);
   const int64_t value = get(device, control, *range);
-  info.value = which == MAQ_CONTROL_AUTO_EXPOSURE ? double(is_automatic_exposure(value)) : double(value) * control.unit;
+  info.value =
+      which == MAQ_SOURCE_CONTROL_AUTO_EXPOSURE ? double(is_automatic_exposure(value)) : double(value) * control.unit;
   return info;
 }
 
-void write_v4l2_control(const V4l2Device& device, maq_control which, double value) {
+void write_v4l2_control(const V4l2Device& device, maq_source_control which, double value) {
   const Control& control = entry(which);
   const auto range = find_range(device, control);
   if (!range) refuse_missing(device, control);
-  const maq_control_info info = info_of(control, *range);
+  const maq_source_control_info info = info_of(control, *range);
   if (!(value >= info.min && value <= info.max)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The ", control.name, " of ", device.path(), " goes from ", info.min,
                 " to ", info.max, control.unit_name, ", not to ", value, ".");
   }
-  if (which == MAQ_CONTROL_AUTO_EXPOSURE) {
+  if (which == MAQ_SOURCE_CONTROL_AUTO_EXPOSURE) {
     const bool on = value >= 0.5;
     set(device, control, *range, on ? range->on : range->off);
     switch_automatic(device, kAutomaticGain, on);

@@ -6,8 +6,8 @@
 
 namespace maq {
 
-// As Camera::control and Camera::set_control, which say what they throw. From any thread.
-maq_control_info read_v4l2_control(const V4l2Device& device, maq_control which);
-void write_v4l2_control(const V4l2Device& device, maq_control which, double value);
+// Like Camera::control and Camera::set_control, with the same errors. From any thread.
+maq_source_control_info read_v4l2_control(const V4l2Device& device, maq_source_control which);
+void write_v4l2_control(const V4l2Device& device, maq_source_control which, double value);
 
 }  // namespace maq

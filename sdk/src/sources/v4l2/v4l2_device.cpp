@@ -23,7 +23,7 @@ constexpr V4l2Format kKnownFormats[] = {
 constexpr int kMaxEnumerated = 256;
 constexpr int kMaxInterruptions = 1000;
 
-// Of a field of fixed size, which may lack the zero at its end.
+// Reads a field of fixed size, which may lack the zero at its end.
 std::string text_of(const uint8_t* bytes, size_t size) {
   const char* begin = reinterpret_cast<const char*>(bytes);
   return std::string(begin, strnlen(begin, size));
@@ -80,7 +80,7 @@ void V4l2Device::query_capabilities() {
   identity_ = name_ + " at " + bus_;
   const uint32_t able = (found.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? found.device_caps : found.capabilities;
   if ((able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) == 0) {
-    fail("captures no pictures (it is another kind of video device)", EINVAL);
+    fail("captures no images (it is another kind of video device)", EINVAL);
   }
   if ((able & V4L2_CAP_STREAMING) == 0) fail("cannot stream into memory", EINVAL);
   is_planar_ = (able & V4L2_CAP_VIDEO_CAPTURE) == 0;

@@ -304,7 +304,7 @@ inline SeenScene see(SolidScene scene, const Intrinsics& camera, double eps_r = 
   field.eps_r = float(eps_r);
   const size_t pixels = size_t(field.width) * size_t(field.height);
   field.distance_r.assign(pixels, float(eps_r));
-  field.spread_r.assign(pixels, 0);
+  field.expected_error_r.assign(pixels, 0);
   field.kind.assign(pixels, kNoEdge);
   field.depth_m.assign(pixels, 0);
   seen.patch.assign(pixels, -1);
@@ -341,7 +341,7 @@ inline SeenScene see(SolidScene scene, const Intrinsics& camera, double eps_r = 
 struct Damage {
   double blur_px = 0, noise_r = 0;
   bool blurs_over_jumps = false;  // where a surface ends: mixes in what the field is beyond
-  int smear_px = 0;
+  int flying_pixel_band_px = 0;
   double depth_noise_r = 0;
 };
 
@@ -376,15 +376,15 @@ inline void damage(SeenScene& seen, const Damage& by, unsigned seed) {
       if (d < field.eps_r) d = std::clamp(float(d + by.noise_r * normal()), 0.0f, field.eps_r);
     }
   }
-  if (by.smear_px > 0) {
+  if (by.flying_pixel_band_px > 0) {
     const auto before = field.depth_m;
     std::vector<uint8_t> is_near(before.size(), 0);
     for (const Vec3& p : seen.samples) {
       const int x = int(std::lround(field.intrinsics.fx_px * p.x / p.z + field.intrinsics.cx_px));
       const int y = int(std::lround(field.intrinsics.fy_px * p.y / p.z + field.intrinsics.cy_px));
-      for (int dy = -by.smear_px; dy <= by.smear_px; ++dy) {
-        for (int dx = -by.smear_px; dx <= by.smear_px; ++dx) {
-          if (dx * dx + dy * dy <= by.smear_px * by.smear_px) is_near[at(x + dx, y + dy)] = 1;
+      for (int dy = -by.flying_pixel_band_px; dy <= by.flying_pixel_band_px; ++dy) {
+        for (int dx = -by.flying_pixel_band_px; dx <= by.flying_pixel_band_px; ++dx) {
+          if (dx * dx + dy * dy <= by.flying_pixel_band_px * by.flying_pixel_band_px) is_near[at(x + dx, y + dy)] = 1;
         }
       }
     }
@@ -392,8 +392,8 @@ inline void damage(SeenScene& seen, const Damage& by, unsigned seed) {
       for (int x = 0; x < w; ++x) {
         if (!is_near[at(x, y)]) continue;
         double sum = 0, count = 0;
-        for (int dy = -by.smear_px; dy <= by.smear_px; ++dy) {
-          for (int dx = -by.smear_px; dx <= by.smear_px; ++dx) {
+        for (int dy = -by.flying_pixel_band_px; dy <= by.flying_pixel_band_px; ++dy) {
+          for (int dx = -by.flying_pixel_band_px; dx <= by.flying_pixel_band_px; ++dx) {
             const float z = before[at(x + dx, y + dy)];
             if (z > 0) sum += z, count += 1;
           }

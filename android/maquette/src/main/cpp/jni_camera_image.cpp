@@ -29,7 +29,7 @@ MAQ_NATIVE(jlong, frameOfImage)
       image.stride_bytes[i] = stride[2 * size_t(i)];
       image.pixel_stride_bytes[i] = stride[2 * size_t(i) + 1];
     }
-    image.is_full_range = is_full_range;
+    image.is_video_range = is_full_range ? 0 : 1;
     image.rotation_deg = rotation_deg;
     image.timestamp_ns = timestamp_ns;
     image.clock = maq_clock(clock);

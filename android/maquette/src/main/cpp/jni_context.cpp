@@ -27,7 +27,7 @@ MAQ_NATIVE(jlong, createContext)(JNIEnv* env, jclass, jint log_level, jbyteArray
   return call(env, [&] {
     maq_context_config config;
     check(maq_context_config_init(&config, sizeof config));
-    config.log_level = maq_log_level(log_level);
+    config.log_level = log_level == 0 ? MAQ_LOG_OFF : maq_log_level(log_level);  // the order of LogLevel
 #ifdef __ANDROID__
     config.log_callback = log_to_logcat;
 #endif

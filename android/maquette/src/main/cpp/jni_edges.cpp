@@ -23,11 +23,11 @@ MAQ_NATIVE_OF(NativeEdges, jlong, create)
     const std::vector<jdouble> from = maq_jni::numbers(env, values, 6);
     maq_edges_config config;
     check(maq_edges_config_init(&config, sizeof config));
-    bundle.put_into(config);
-    config.threads = int32_t(from[0]);
+    bundle.put_into(config.model);
+    config.model.threads = int32_t(from[0]);
     config.result_pool_size = maq_jni::count_of(from[1]);
-    config.allow_spinning = int32_t(from[2]);
-    config.provider = maq_provider(int32_t(from[3]));
+    config.model.spinning = from[2] != 0 ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
+    config.model.provider = maq_provider(int32_t(from[3]));
     config.skip_planes = int32_t(from[4]);
     config.average_frames = int32_t(from[5]);
     maq_edges* edges = nullptr;
@@ -38,11 +38,10 @@ MAQ_NATIVE_OF(NativeEdges, jlong, create)
 
 MAQ_NATIVE_OF(NativeEdges, void, destroy)(JNIEnv*, jclass, jlong edges) { maq_edges_destroy(object<maq_edges>(edges)); }
 
-MAQ_NATIVE_OF(NativeEdges, jlong, run)(JNIEnv* env, jclass, jlong edges, jlong frame, jdoubleArray intrinsics) {
+MAQ_NATIVE_OF(NativeEdges, jlong, run)(JNIEnv* env, jclass, jlong edges, jlong frame) {
   return call(env, [&] {
-    const maq_intrinsics given = maq_jni::intrinsics(env, intrinsics);
     maq_edges_result* result = nullptr;
-    check(maq_edges_run(object<maq_edges>(edges), object<maq_frame>(frame), &given, &result));
+    check(maq_edges_run(object<maq_edges>(edges), object<maq_frame>(frame), &result));
     return handle(result);
   });
 }
@@ -55,14 +54,11 @@ MAQ_NATIVE_OF(NativeEdges, void, releaseResult)(JNIEnv*, jclass, jlong result) {
   maq_edges_result_release(object<maq_edges_result>(result));
 }
 
-MAQ_NATIVE_OF(NativeEdges, void, saveResult)(JNIEnv* env, jclass, jlong result, jbyteArray folder, jbyteArray stem) {
-  call(env, [&] {
-    const std::string to = maq_jni::text(env, folder), name = maq_jni::text(env, stem);
-    check(maq_edges_result_save(object<maq_edges_result>(result), to.c_str(), name.c_str()));
-  });
+MAQ_NATIVE_OF(NativeEdges, void, saveResult)(JNIEnv* env, jclass, jlong result, jbyteArray path) {
+  call(env, [&] { check(maq_edges_result_save(object<maq_edges_result>(result), maq_jni::text(env, path).c_str())); });
 }
 
-// Where distances end, then the intrinsics, which have the size of the planes.
+// Returns the largest distance, then the intrinsics, which have the size of the planes.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, fieldOfResult)(JNIEnv* env, jclass, jlong result) {
   return call(env, [&] {
     auto field = sized<maq_edges_field>();
@@ -105,15 +101,13 @@ MAQ_NATIVE_OF(NativeEdges, jdoubleArray, statsOfResult)(JNIEnv* env, jclass, jlo
 // `values` as in EdgeCurves.Config.
 MAQ_NATIVE_OF(NativeEdges, jlong, findCurves)(JNIEnv* env, jclass, jlong result, jdoubleArray values) {
   return call(env, [&] {
-    const std::vector<jdouble> from = maq_jni::numbers(env, values, 11);
+    const std::vector<jdouble> from = maq_jni::numbers(env, values, 7);
     maq_edges_curves_config config;
     check(maq_edges_curves_config_init(&config, sizeof config));
-    float* const lengths[] = {&config.select_px,   &config.min_votes, &config.smear_px,
-                              &config.support_px,  &config.break_deg, &config.min_length_px,
-                              &config.tolerance_r, &config.gap_r,     &config.join_px};
-    for (size_t i = 0; i < 9; ++i) *lengths[i] = float(from[i]);
-    config.max_curves = int32_t(from[9]);
-    config.find_boxes = int32_t(from[10]);
+    float* const numbers[] = {&config.vote_radius_px, &config.min_votes,       &config.flying_pixel_band_px,
+                              &config.fit_band_px,    &config.split_angle_deg, &config.min_length_px};
+    for (size_t i = 0; i < 6; ++i) *numbers[i] = float(from[i]);
+    config.skip_boxes = int32_t(from[6]);
     maq_edges_curves* curves = nullptr;
     check(maq_edges_result_find_curves(object<maq_edges_result>(result), &config, &curves));
     return handle(curves);
@@ -124,7 +118,7 @@ MAQ_NATIVE_OF(NativeEdges, void, releaseCurves)(JNIEnv*, jclass, jlong curves) {
   maq_edges_curves_release(object<maq_edges_curves>(curves));
 }
 
-// How many curves, corners and boxes there are; then how long it took to find curves and boxes, in milliseconds.
+// Returns the numbers of curves, corners and boxes, then the times for curves and boxes in milliseconds.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, countsOfCurves)(JNIEnv* env, jclass, jlong curves) {
   return call(env, [&] {
     auto* const from = object<maq_edges_curves>(curves);
@@ -136,20 +130,20 @@ MAQ_NATIVE_OF(NativeEdges, jdoubleArray, countsOfCurves)(JNIEnv* env, jclass, jl
   });
 }
 
-// Type, kind, bend, closed, corners, length and residual; then the points of its polyline.
+// Returns type, kind, convexity, closed, corners, length and residual; then the points of the polyline.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, curve)(JNIEnv* env, jclass, jlong curves, jint index) {
   return call(env, [&] {
     auto curve = sized<maq_edges_curve>();
     check(maq_edges_curves_get_curve(object<maq_edges_curves>(curves), uint32_t(index), &curve));
-    std::vector<jdouble> values = {
-        double(curve.type),       double(curve.kind),       double(curve.bend), double(curve.is_closed),
-        double(curve.corners[0]), double(curve.corners[1]), curve.length_m,     curve.rms_r};
+    std::vector<jdouble> values = {double(curve.type),      double(curve.kind),       double(curve.convexity),
+                                   double(curve.is_closed), double(curve.corners[0]), double(curve.corners[1]),
+                                   curve.length_m,          curve.rms_footprints};
     append(values, curve.points_m, size_t(3) * curve.point_count);
     return maq_jni::doubles_of(env, values);
   });
 }
 
-// How many curves end in it, then x, y, z.
+// Returns the number of curves that end in the corner, then x, y, z.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, corner)(JNIEnv* env, jclass, jlong curves, jint index) {
   return call(env, [&] {
     auto corner = sized<maq_edges_corner>();
@@ -160,27 +154,27 @@ MAQ_NATIVE_OF(NativeEdges, jdoubleArray, corner)(JNIEnv* env, jclass, jlong curv
   });
 }
 
-// Corners seen, the sides, of each plus or minus, their directions, the centre.
+// Returns the number of visible corners, the lengths of the sides, their tolerances, their directions, the centre.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, box)(JNIEnv* env, jclass, jlong curves, jint index) {
   return call(env, [&] {
     auto box = sized<maq_edges_box>();
     check(maq_edges_curves_get_box(object<maq_edges_curves>(curves), uint32_t(index), &box));
     std::vector<jdouble> values = {double(box.corner_count)};
     append(values, box.size_m, 3);
-    append(values, box.plus_minus_m, 3);
+    append(values, box.size_tolerance_m, 3);
     append(values, &box.axes[0][0], 9);
     append(values, box.centre_m, 3);
     return maq_jni::doubles_of(env, values);
   });
 }
 
-// What it is (maq_edges_snap_target), which, and which side; x, y, z; pixels from the place asked for.
+// Returns the target (maq_edges_snap_target), its indices, x, y, z, and the distance in pixels.
 MAQ_NATIVE_OF(NativeEdges, jdoubleArray, snap)
 (JNIEnv* env, jclass, jlong curves, jdouble x_px, jdouble y_px, jdouble radius_px) {
   return call(env, [&] {
     auto snap = sized<maq_edges_snap>();
     check(maq_edges_curves_snap_to_pixel(object<maq_edges_curves>(curves), x_px, y_px, radius_px, &snap));
-    std::vector<jdouble> values = {double(snap.target), double(snap.index), double(snap.side)};
+    std::vector<jdouble> values = {double(snap.target), double(snap.index), double(snap.adjacent_plane_index)};
     append(values, snap.point_m, 3);
     values.push_back(snap.distance_px);
     return maq_jni::doubles_of(env, values);

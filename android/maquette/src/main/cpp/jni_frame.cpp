@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "jni_call.h"
+#include "jni_config.h"
 #include "jni_threads.h"
 
 using maq_jni::call;
@@ -67,7 +67,7 @@ void require_rows(const Memory& memory, int64_t rows, int64_t stride, int64_t ro
 
 MAQ_NATIVE(jlong, wrapFrame)
 (JNIEnv* env, jclass, jlong context, jint format, jint width_px, jint height_px, jobject first, jint first_stride,
- jobject second, jint second_stride, jlong timestamp_ns, jint clock, jlong sequence) {
+ jobject second, jint second_stride, jlong timestamp_ns, jint clock, jlong sequence, jdoubleArray intrinsics) {
   return call(env, [&] {
     maq_frame_desc desc;
     check(maq_frame_desc_init(&desc, sizeof desc));
@@ -77,6 +77,7 @@ MAQ_NATIVE(jlong, wrapFrame)
     desc.timestamp_ns = timestamp_ns;
     desc.clock = maq_clock(clock);
     desc.sequence = uint64_t(sequence);
+    if (intrinsics != nullptr) desc.intrinsics = maq_jni::intrinsics(env, intrinsics);
     const std::array<jobject, 2> buffers = {first, second};
     const std::array<jint, 2> strides = {first_stride, second_stride};
     auto held = std::make_unique<Held>();
@@ -126,7 +127,17 @@ MAQ_NATIVE(jlongArray, describeFrame)(JNIEnv* env, jclass, jlong frame) {
   });
 }
 
-// Of a predicted frame its horizon and age, and the timestamp and sequence of the captured one; null of a captured
+// Returns the intrinsics; null if they are unknown.
+MAQ_NATIVE(jdoubleArray, intrinsicsOfFrame)(JNIEnv* env, jclass, jlong frame) {
+  return call(env, [&]() -> jdoubleArray {
+    maq_frame_desc desc;
+    check(maq_frame_desc_init(&desc, sizeof desc));
+    check(maq_frame_get_desc(object<maq_frame>(frame), &desc));
+    return desc.intrinsics.width_px == 0 ? nullptr : maq_jni::doubles_of(env, maq_jni::values_of(desc.intrinsics));
+  });
+}
+
+// For a predicted frame: its horizon and age, and timestamp and sequence of the captured frame. Null for a captured
 // frame.
 MAQ_NATIVE(jlongArray, originOfFrame)(JNIEnv* env, jclass, jlong frame) {
   return call(env, [&]() -> jlongArray {

@@ -153,7 +153,7 @@ MAQ_NATIVE_OF(NativePicture, jlong, frameOfBuffer)
   return call(env, [&] {
     maq_yuv_image like;
     check(maq_yuv_image_init(&like, sizeof like));
-    like.is_full_range = is_full_range;
+    like.is_video_range = is_full_range ? 0 : 1;
     like.rotation_deg = rotation_deg;
     like.timestamp_ns = timestamp_ns;
     like.clock = maq_clock(clock);

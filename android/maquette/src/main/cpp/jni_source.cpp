@@ -83,9 +83,9 @@ MAQ_NATIVE_OF(NativeSource, jdoubleArray, intrinsics)(JNIEnv* env, jclass, jlong
 // min, max, step, default and value; null when the device does not have the control.
 MAQ_NATIVE_OF(NativeSource, jdoubleArray, control)(JNIEnv* env, jclass, jlong source, jint control) {
   return call(env, [&]() -> jdoubleArray {
-    maq_control_info info{};
+    maq_source_control_info info{};
     info.struct_size = sizeof info;
-    const maq_status status = maq_source_get_control(source_of(source), maq_control(control), &info);
+    const maq_status status = maq_source_get_control(source_of(source), maq_source_control(control), &info);
     if (status == MAQ_ERROR_UNSUPPORTED) return nullptr;
     check(status);
     return maq_jni::doubles_of(env, {info.min, info.max, info.step, info.default_value, info.value});
@@ -93,7 +93,7 @@ MAQ_NATIVE_OF(NativeSource, jdoubleArray, control)(JNIEnv* env, jclass, jlong so
 }
 
 MAQ_NATIVE_OF(NativeSource, void, setControl)(JNIEnv* env, jclass, jlong source, jint control, jdouble value) {
-  call(env, [&] { check(maq_source_set_control(source_of(source), maq_control(control), value)); });
+  call(env, [&] { check(maq_source_set_control(source_of(source), maq_source_control(control), value)); });
 }
 
 MAQ_NATIVE_OF(NativeSource, jint, schemeCount)(JNIEnv*, jclass) { return jint(maq_source_get_scheme_count()); }

@@ -50,7 +50,7 @@ const AndroidImages& AndroidImages::get() {
 }
 
 JpegResult AndroidImages::decode(const EncodedBytes& encoded, int64_t max_pixels, Frame& frame) const {
-  // Android rotates pictures upright, and there is no option against it: an EXIF orientation is taken out of a copy.
+  // Android rotates images upright, and no option prevents it. A copy without the EXIF orientation is decoded.
   std::vector<uint8_t> without_orientation;
   EncodedBytes bytes = encoded;
   if (const auto place = find_exif_orientation(encoded)) {

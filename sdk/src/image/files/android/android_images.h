@@ -24,11 +24,12 @@ class AndroidImages {
   // EXIF orientation. Over the limits of frame.h: damaged. Throws std::bad_alloc.
   JpegResult decode(const EncodedBytes& encoded, int64_t max_pixels, Frame& frame) const;
 
-  // Any picture; `quality` 1 to 100 is of JPEG. PNG has alpha where the picture is RGBA8. False where Android cannot.
+  // Encodes any image; `quality` is 1 to 100, for JPEG. PNG has alpha where the image is RGBA8. False where Android
+  // cannot.
   bool encode(const ImageView& image, Encoding encoding, int quality, std::vector<uint8_t>& bytes) const;
 
  private:
-  // As AndroidBitmapInfo.
+  // The fields of AndroidBitmapInfo.
   struct BitmapInfo {
     uint32_t width, height, stride;
     int32_t format;

@@ -117,7 +117,7 @@ maq_frame* frame_of_yuv(const AHardwareBuffer_Planes& planes, maq_context* conte
   const bool is_nv12 = u.pixelStride == 2 && v.pixelStride == 2 && u.rowStride == v.rowStride &&
                        static_cast<uint8_t*>(v.data) == static_cast<uint8_t*>(u.data) + 1 &&
                        planes.planes[0].pixelStride == 1;
-  if (is_nv12 && image.is_full_range == 0 && image.rotation_deg == 0) {
+  if (is_nv12 && image.is_video_range == 1 && image.rotation_deg == 0) {
     maq_frame_desc desc = like;
     desc.format = MAQ_PIXEL_NV12;
     for (int i = 0; i < 2; ++i) {

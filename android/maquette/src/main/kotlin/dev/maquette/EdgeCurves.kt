@@ -11,101 +11,89 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, NativeEdges::releaseCurves)
 
     /**
-     * How curves are found; lengths in pixels and footprints, so that the defaults suit any camera and scene.
+     * Settings of the curve search. The defaults suit all cameras and scenes, because lengths are in pixels.
      *
-     * @property selectPx pixels nearer than that to an edge say where it is.
-     * @property minVotes how many an edge needs: 1 is what all pixels on one side of it have together.
-     * @property smearPx so near an edge depth may be of neither surface.
-     * @property supportPx surfaces beside an edge are fitted to a band so wide, and three times as wide where depth is noisy.
-     * @property breakDegrees a curve that turns by more at one place is two.
-     * @property minLengthPx shorter curves are left out.
-     * @property toleranceR the simplest type is taken that is so near the edge.
-     * @property gapR surfaces farther apart along the ray do not meet in a crease.
-     * @property joinPx ends so near the place where their curves meet share a corner.
-     * @property maxCurves more are left out.
-     * @property findBoxes whether boxes are looked for, too.
+     * @property voteRadiusPx pixels nearer than this to an edge vote for its position.
+     * @property minVotes votes an edge needs; 1 is the sum of all votes from one side of an edge.
+     * @property flyingPixelBandPx half-width of the band of mixed (flying) pixels along an edge.
+     * @property fitBandPx width of the band beyond it to which surfaces are fitted; three times as wide in noise.
+     * @property splitAngleDegrees a curve that turns by more than this at one point is split.
+     * @property minLengthPx shorter curves are dropped.
+     * @property skipBoxes true: do not search for boxes.
      */
     data class Config(
-        val selectPx: Float = 4f,
+        val voteRadiusPx: Float = 4f,
         val minVotes: Float = 0.35f,
-        val smearPx: Float = 3f,
-        val supportPx: Float = 8f,
-        val breakDegrees: Float = 15f,
+        val flyingPixelBandPx: Float = 3f,
+        val fitBandPx: Float = 8f,
+        val splitAngleDegrees: Float = 15f,
         val minLengthPx: Float = 10f,
-        val toleranceR: Float = 0.5f,
-        val gapR: Float = 2.5f,
-        val joinPx: Float = 12f,
-        val maxCurves: Int = 1024,
-        val findBoxes: Boolean = true,
+        val skipBoxes: Boolean = false,
     ) {
         internal fun values() =
             doubleArrayOf(
-                selectPx.toDouble(),
+                voteRadiusPx.toDouble(),
                 minVotes.toDouble(),
-                smearPx.toDouble(),
-                supportPx.toDouble(),
-                breakDegrees.toDouble(),
+                flyingPixelBandPx.toDouble(),
+                fitBandPx.toDouble(),
+                splitAngleDegrees.toDouble(),
                 minLengthPx.toDouble(),
-                toleranceR.toDouble(),
-                gapR.toDouble(),
-                joinPx.toDouble(),
-                maxCurves.toDouble(),
-                if (findBoxes) 1.0 else 0.0,
+                if (skipBoxes) 1.0 else 0.0,
             )
     }
 
     enum class Type {
         LINE,
 
-        /** Of a circle, or a whole one. */
+        /** A circular arc or a whole circle. */
         ARC,
 
         /** A cubic B-spline. */
         SPLINE,
     }
 
-    /** Of a crease, seen from the camera's side. */
-    enum class Bend {
+    /** The convexity of a crease, seen from the camera's side. */
+    enum class Convexity {
         UNKNOWN,
 
-        /** As of a box. */
+        /** Like the edge of a box. */
         CONVEX,
 
-        /** As between a wall and the floor. */
+        /** Like the edge between a wall and the floor. */
         CONCAVE,
     }
 
     /**
-     * @property points the polyline that is drawn of it; of a line its two ends.
-     * @property startCorner index in [corners]; -1: it ends freely.
-     * @property endCorner as [startCorner].
-     * @property rmsR how far, in footprints, the places are that it was fitted to.
+     * @property points a polyline along the curve; the two ends of a line.
+     * @property startCorner index in [corners]; -1: a free end.
+     * @property endCorner index in [corners]; -1: a free end.
+     * @property rmsFootprints root mean square distance of the measured points from the curve, in footprints.
      */
     data class Curve(
         val type: Type,
         val kind: EdgesResult.Kind,
-        val bend: Bend,
+        val convexity: Convexity,
         val isClosed: Boolean,
         val startCorner: Int,
         val endCorner: Int,
         val lengthM: Double,
-        val rmsR: Double,
+        val rmsFootprints: Double,
         val points: List<Point3>,
     )
 
-    /** @property curveCount how many curves end in it. */
+    /** @property curveCount number of curves that end here. */
     data class Corner(val point: Point3, val curveCount: Int)
 
     /**
-     * @property cornersSeen of its eight.
-     * @property sizeM its sides, the longest first.
-     * @property plusMinusM of each side two standard deviations.
-     * @property axes the direction of each side, of length 1.
+     * @property cornersSeen visible corners, at most 8.
+     * @property sizeM lengths of the sides, the longest first.
+     * @property sizeToleranceM two standard deviations of each length.
+     * @property axes directions of the sides, length 1.
      */
     data class Box(
         val cornersSeen: Int,
         val sizeM: List<Double>,
-        val plusMinusM: List<Double>,
+        val sizeToleranceM: List<Double>,
         val axes: List<Point3>,
         val centre: Point3,
     )
@@ -114,21 +102,21 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     enum class Target { NOTHING, CORNER, CURVE, PLANE }
 
     /**
-     * What is at a pixel.
+     * The target at a pixel.
      *
-     * @property index of the corner or the curve; of a plane, of a curve that it is beside.
-     * @property point of the target.
-     * @property distancePx how far it is from the pixel in the picture; 0 on a plane.
+     * @property index index of the corner, the curve, or the plane's curve.
+     * @property point point of the target.
+     * @property distancePx distance to the target in the image; 0 on a plane.
      */
     data class Snap(val target: Target, val index: Int, val point: Point3, val distancePx: Double)
 
     val curves: List<Curve>
     val corners: List<Corner>
 
-    /** The largest first. */
+    /** Sorted by volume, the largest first. */
     val boxes: List<Box>
 
-    /** How long curves and boxes took to find, milliseconds. */
+    /** Times for finding curves and boxes, in milliseconds. */
     val curvesMs: Double
     val boxesMs: Double
 
@@ -146,8 +134,8 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * The nearest corner within the radius of a pixel of the depth frame, or else the nearest curve, or else the plane
-     * beside a curve that the pixel's depth lies on.
+     * Finds the nearest corner within the radius of a pixel of the depth frame, or else the nearest curve, or else the
+     * adjacent plane on which the pixel's depth lies.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a radius that is not 0 to 1e6.
      */
@@ -168,7 +156,7 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
 
     private fun curveOf(c: DoubleArray) =
         Curve(
-            Type.entries[c[0].toInt()], EdgesResult.Kind.entries[c[1].toInt()], Bend.entries[c[2].toInt()], c[3] != 0.0,
+            Type.entries[c[0].toInt()], EdgesResult.Kind.entries[c[1].toInt()], Convexity.entries[c[2].toInt()], c[3] != 0.0,
             c[4].toInt(), c[5].toInt(), c[6], c[7], List((c.size - 8) / 3) { pointAt(c, 8 + 3 * it) },
         )
 

@@ -9,7 +9,7 @@ import java.nio.FloatBuffer
  * Finds the sharp edges in frames of a depth camera. Made by [Maquette.edges].
  *
  * ```
- * edges.run(frame, intrinsics).use { result ->
+ * edges.run(frame).use { result ->
  *     result.findCurves().use { found -> found.boxes.firstOrNull()?.let { show(it.sizeM) } }
  * }
  * ```
@@ -21,10 +21,10 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
      * @property threads as of [DensePose.Config].
      * @property resultPoolSize results, and as many [EdgeCurves], that the app may hold at once.
      * @property allowSpinning as of [DensePose.Config].
-     * @property skipPlanes true: the network runs only where a plane does not explain the depth within the sensor's
-     *   noise: faster, and may miss flat creases in noise.
-     * @property averageFrames 2 to 64: depth is the mean over so many frames of a camera at rest, which takes noise away;
-     *   what moves begins anew. 0: each frame is on its own.
+     * @property skipPlanes true: the network runs only where depth is not flat within the sensor's noise. This is
+     *   faster and may miss flat creases in noise.
+     * @property averageFrames 2 to 64: average depth over this number of frames, to reduce noise. The camera must not
+     *   move. 0: no averaging.
      */
     data class Config(
         val threads: Int = 0,
@@ -46,21 +46,18 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * Finds the field of a depth frame, or of the depth that came with a picture. Takes milliseconds, so not on the
-     * main thread; one call at a time. The first frame of a size takes longer.
+     * Finds the field of a depth frame, or of the depth that came with a colour frame. Takes milliseconds, so not on
+     * the main thread; one call at a time. The first frame of a size takes longer.
      *
-     * @param intrinsics of the depth frame, or of the picture that the depth came with; distortion is left out of
-     *   account.
-     * @throws MaquetteException with [Status.UNSUPPORTED] (a frame without depth), [Status.INVALID_ARGUMENT] (intrinsics
-     *   of another size), [Status.POOL_EMPTY] while [Config.resultPoolSize] results are open, and [Status.CANCELLED]
-     *   after [cancel].
+     * @param frame must have [Frame.intrinsics]; distortion is ignored.
+     * @throws MaquetteException with [Status.UNSUPPORTED] (a frame without depth or intrinsics),
+     *   [Status.INVALID_ARGUMENT] (intrinsics of another size), [Status.POOL_EMPTY] while [Config.resultPoolSize]
+     *   results are open, and [Status.CANCELLED] after [cancel].
      */
-    fun run(frame: Frame, intrinsics: Intrinsics): EdgesResult =
-        handle.use { edges ->
-            frame.handle.use { EdgesResult(NativeEdges.run(edges, it, intrinsics.values())) }
-        }
+    fun run(frame: Frame): EdgesResult =
+        handle.use { edges -> frame.handle.use { EdgesResult(NativeEdges.run(edges, it)) } }
 
-    /** Ends the [run] that runs, or else the next; from any thread. */
+    /** Cancels the running [run], or else the next one; from any thread. */
     fun cancel() = handle.use(NativeEdges::cancel)
 
     override fun close() = handle.close()
@@ -70,26 +67,26 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
 class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, NativeEdges::releaseResult)
 
-    /** What is known of each pixel, as floats. */
+    /** The planes of floats. */
     enum class Plane(internal val code: Int) {
-        /** To the nearest edge, in footprints (depth / focal length); [epsR]: none is nearer. */
+        /** Distance to the nearest edge, in footprints (depth / focal length); [epsR]: no edge is nearer. */
         DISTANCE(1),
 
-        /** By how many footprints the distance may be wrong. */
-        SPREAD(2),
+        /** Predicted mean absolute error of the distance, in footprints. */
+        EXPECTED_ERROR(2),
 
         /** The frame's depth in metres; 0 where it is unknown. */
         DEPTH(4),
     }
 
-    /** What the nearest edge of a pixel is. */
+    /** The kind of a pixel's nearest edge. */
     enum class Kind {
         NONE,
 
-        /** Two surfaces meet in it, and both are seen. */
+        /** Two surfaces meet, and both are visible. */
         CREASE,
 
-        /** The surface ends there; its other side is hidden. */
+        /** The surface ends here and hides its other side. */
         BOUNDARY,
     }
 
@@ -110,10 +107,10 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
         val averagedPixels: Long,
     )
 
-    /** Where distances end, in footprints. */
+    /** The largest distance, in footprints. */
     val epsR: Double
 
-    /** Of the depth frame. */
+    /** Camera of the depth frame. */
     val intrinsics: Intrinsics
     val widthPx: Int get() = intrinsics.widthPx
     val heightPx: Int get() = intrinsics.heightPx
@@ -125,8 +122,8 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * A plane as it lies in native memory, [heightPx] rows of [widthPx] values, read-only and without a copy. It must
-     * not be read after the result has been closed: [copyPlane] gives what stays.
+     * Returns a plane in native memory, [heightPx] rows of [widthPx] values, read-only and without a copy. Do not read
+     * it after the result has been closed: use [copyPlane] for a copy.
      */
     fun plane(plane: Plane): FloatBuffer = bytes(plane.code, Float.SIZE_BYTES).asFloatBuffer()
 
@@ -134,7 +131,7 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
     fun copyPlane(plane: Plane): FloatArray =
         handle.use { FloatArray(widthPx * heightPx).also { values -> plane(plane).get(values) } }
 
-    /** The [Kind] of each pixel's nearest edge, as its number; as [copyPlane]. */
+    /** Copies the ordinals of [Kind], [heightPx] rows of [widthPx] values. */
     fun copyKinds(): ByteArray =
         handle.use { ByteArray(widthPx * heightPx).also { values -> bytes(KINDS, 1).get(values) } }
 
@@ -146,15 +143,14 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
         handle.use { EdgeCurves(NativeEdges.findCurves(it, config.values())) }
 
     /**
-     * Writes `<stem>_distance.png`, `<stem>_kind.png` and `<stem>_edges.json`, atomically, into a folder that exists.
+     * Writes `<path>_distance.png`, `<path>_kind.png` and `<path>_edges.json`, atomically, into a folder that exists.
      * Needs Android 11. Blocks while they are written.
      *
-     * @throws MaquetteException as [DensePoseResult.save].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (an empty path, or a folder) and [Status.UNWRITABLE].
      */
-    fun save(folder: String, stem: String) =
-        handle.use { NativeEdges.saveResult(it, folder.toByteArray(), stem.toByteArray()) }
+    fun save(path: String) = handle.use { NativeEdges.saveResult(it, path.toByteArray()) }
 
-    /** Of the run that gave the result. */
+    /** Times and counts of the run. */
     val stats: Stats
         get() {
             val s = handle.use(NativeEdges::statsOfResult)

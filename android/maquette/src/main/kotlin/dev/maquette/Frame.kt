@@ -60,6 +60,9 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
     /** Its number in its source, from 0. */
     val sequence: Long get() = description[5]
 
+    /** How its camera maps directions to pixels; null if that is unknown. Frames of a calibrated [Source] have it. */
+    val intrinsics: Intrinsics? get() = handle.use(Native::intrinsicsOfFrame)?.let(Intrinsics::of)
+
     /**
      * The captured frame that a predicted frame was made from.
      *

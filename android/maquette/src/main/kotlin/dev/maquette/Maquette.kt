@@ -51,6 +51,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      * until the frame has been closed; the frame keeps the buffers.
      *
      * @param second U and V of [PixelFormat.NV12].
+     * @param intrinsics of the camera, for the frame's size; [Edges.run] needs them. null: unknown.
      */
     fun frame(
         format: PixelFormat,
@@ -61,6 +62,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         timestampNs: Long = 0,
         clock: Clock = Clock.MEDIA,
         sequence: Long = 0,
+        intrinsics: Intrinsics? = null,
     ): Frame =
         handle.use { context ->
             Frame(
@@ -76,6 +78,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
                     timestampNs,
                     clock.code,
                     sequence,
+                    intrinsics?.values(),
                 ),
             )
         }

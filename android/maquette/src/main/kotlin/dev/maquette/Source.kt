@@ -40,7 +40,7 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
      * @property framePoolSize frames that the app may hold at once, 1 to 64.
      * @property queueLength for cameras: frames that wait for the app, 1 to 64; a new one replaces the oldest.
      * @property stallMs for cameras: after this time without a frame the camera counts as stalled, 50 to 60000 ms.
-     * @property reconnectMs for cameras: how long to wait for one that was lost, 0 to 86400000 ms.
+     * @property reconnectMs for cameras: how long to wait for one that was lost, 1 to 86400000 ms; -1: not at all.
      * @property isRealTime true: clips, recordings and stubs play in real time like a camera, unless the URI has
      *   `live=0`; false: frames come as fast as they are acquired, unless it has `live=1`.
      * @property isLoop true: a source that plays in real time starts again at its end, unless the URI has `loop=0`.

@@ -7,7 +7,6 @@ import kotlin.math.sqrt
 import org.junit.Assert.assertArrayEquals
 import org.junit.Assert.assertEquals
 import org.junit.Assert.assertNull
-import org.junit.Assert.assertThrows
 import org.junit.Assert.assertTrue
 import org.junit.Test
 
@@ -30,17 +29,17 @@ class EdgesTest : AndroidTest() {
     @Test
     fun aBoxIsMeasuredSnappedToAndSaved() =
         withBox { _, edges, frame, intrinsics ->
-            val result = edges.run(frame, intrinsics)
+            val result = edges.run(frame)
             val found = result.use { it.findCurves() }
             found.use {
                 val box = found.boxes.single()
                 assertEquals(box.sizeM.sortedDescending(), box.sizeM)
                 assertTrue("${box.sizeM}", box.sizeM.all { it in 0.3..0.5 })
-                assertTrue(box.plusMinusM.all { it >= 0 } && box.cornersSeen in 4..8)
+                assertTrue(box.sizeToleranceM.all { it >= 0 } && box.cornersSeen in 4..8)
                 for (axis in box.axes) assertEquals(1.0, length(axis, Point3(0.0, 0.0, 0.0)), 1e-6)
                 val line = found.curves.first { it.type == EdgeCurves.Type.LINE }
                 assertEquals(line.lengthM, length(line.points.first(), line.points.last()), 1e-6)
-                assertTrue(line.kind != EdgesResult.Kind.NONE && line.rmsR >= 0)
+                assertTrue(line.kind != EdgesResult.Kind.NONE && line.rmsFootprints >= 0)
                 val ends = found.curves.flatMap { listOf(it.startCorner, it.endCorner) }.filter { it >= 0 }
                 assertTrue(ends.all { it in found.corners.indices })
                 for ((index, corner) in found.corners.withIndex()) {
@@ -70,7 +69,7 @@ class EdgesTest : AndroidTest() {
     @Test
     fun planesHaveTheFramesSize() =
         withBox { _, edges, frame, intrinsics ->
-            edges.run(frame, intrinsics).use { result ->
+            edges.run(frame).use { result ->
                 assertEquals(320 to 240, result.widthPx to result.heightPx)
                 assertEquals(intrinsics, result.intrinsics)
                 assertEquals(16.0, result.epsR, 0.0)
@@ -89,7 +88,7 @@ class EdgesTest : AndroidTest() {
                 assertEquals(depth.metres.count { it > 0 }.toLong(), stats.knownPixels)
                 assertTrue(stats.totalMs > 0 && stats.networkPixels > 0 && stats.threads > 0)
                 TestFiles.inNewFolder { folder ->
-                    result.save(folder.path, "box")
+                    result.save(File(folder, "box").path)
                     assertEquals(
                         setOf("box_distance.png", "box_kind.png", "box_edges.json"),
                         folder.list()!!.toSet(),
@@ -104,11 +103,13 @@ class EdgesTest : AndroidTest() {
             val metres = frame.copyDepth()!!.metres
             val bytes = TestFiles.direct(ByteArray(2 * metres.size)).order(ByteOrder.nativeOrder())
             metres.forEachIndexed { k, z -> bytes.putShort(2 * k, (1000 * z + 0.5f).toInt().toShort()) }
-            maquette.frame(PixelFormat.DEPTH16, 320, 240, Plane(bytes)).use { own ->
+            assertEquals(intrinsics, frame.intrinsics)
+            maquette.frame(PixelFormat.DEPTH16, 320, 240, Plane(bytes), intrinsics = intrinsics).use { own ->
+                assertEquals(intrinsics, own.intrinsics)
                 val depth = own.copyDepth()!!
                 for (k in metres.indices) assertTrue(abs(depth.metres[k] - metres[k]) < 5.1e-4f)
                 val (exact, rounded) = listOf(frame, own).map { from ->
-                    edges.run(from, intrinsics).use { result ->
+                    edges.run(from).use { result ->
                         result.findCurves().use { found -> found.boxes.single().sizeM }
                     }
                 }
@@ -119,20 +120,19 @@ class EdgesTest : AndroidTest() {
     @Test
     fun whatIsNotAskedForIsLeftOut() =
         withBox(Edges.Config(skipPlanes = true)) { _, edges, frame, intrinsics ->
-            edges.run(frame, intrinsics).use { result ->
-                result.findCurves(EdgeCurves.Config(findBoxes = false, maxCurves = 2)).use { found ->
-                    assertTrue(found.boxes.isEmpty())
-                    assertEquals(2, found.curves.size)
+            edges.run(frame).use { result ->
+                result.findCurves(EdgeCurves.Config(skipBoxes = true)).use { found ->
+                    assertTrue(found.boxes.isEmpty() && found.curves.isNotEmpty())
                 }
-                failure(Status.INVALID_ARGUMENT) { result.findCurves(EdgeCurves.Config(minLengthPx = 0f)) }
+                failure(Status.INVALID_ARGUMENT) { result.findCurves(EdgeCurves.Config(minLengthPx = -1f)) }
             }
         }
 
     @Test
     fun framesAtRestAreAveragedWhenAskedFor() =
         withBox(Edges.Config(averageFrames = 8)) { _, edges, frame, intrinsics ->
-            edges.run(frame, intrinsics).use { assertEquals(0L, it.stats.averagedPixels) }
-            edges.run(frame, intrinsics).use { assertEquals(it.stats.knownPixels, it.stats.averagedPixels) }
+            edges.run(frame).use { assertEquals(0L, it.stats.averagedPixels) }
+            edges.run(frame).use { assertEquals(it.stats.knownPixels, it.stats.averagedPixels) }
         }
 
     @Test
@@ -140,23 +140,28 @@ class EdgesTest : AndroidTest() {
         withBox(Edges.Config(resultPoolSize = 2)) { maquette, edges, frame, intrinsics ->
             maquette.decode(TestFiles.photo.readBytes()).use { photo ->
                 assertNull(photo.copyDepth())
-                val size = Intrinsics(photo.widthPx, photo.heightPx, 500.0, 500.0, 256.0, 256.0)
-                assertTrue("depth" in failure(Status.UNSUPPORTED) { edges.run(photo, size) })
+                assertNull(photo.intrinsics)
+                assertTrue("depth" in failure(Status.UNSUPPORTED) { edges.run(photo) })
             }
+            fun wrapped(camera: Intrinsics?) =
+                maquette.frame(
+                    PixelFormat.DEPTH16, 320, 240, Plane(TestFiles.direct(ByteArray(2 * 320 * 240))), intrinsics = camera,
+                )
             val other = intrinsics.copy(widthPx = 640)
-            assertTrue("640" in failure(Status.INVALID_ARGUMENT) { edges.run(frame, other) })
-            assertThrows(MaquetteException::class.java) { edges.run(frame, intrinsics.copy(fxPx = 0.0)) }
-            val held = List(2) { edges.run(frame, intrinsics) }
-            failure(Status.POOL_EMPTY) { edges.run(frame, intrinsics) }
+            assertTrue("640" in failure(Status.INVALID_ARGUMENT) { wrapped(other) })
+            wrapped(intrinsics.copy(fxPx = 0.0)).use { assertTrue("fx_px" in failure(Status.INVALID_ARGUMENT) { edges.run(it) }) }
+            wrapped(null).use { assertTrue("intrinsics" in failure(Status.UNSUPPORTED) { edges.run(it) }) }
+            val held = List(2) { edges.run(frame) }
+            failure(Status.POOL_EMPTY) { edges.run(frame) }
             held.forEach(EdgesResult::close)
             edges.cancel()
-            failure(Status.CANCELLED) { edges.run(frame, intrinsics) }
-            edges.run(frame, intrinsics).close()
+            failure(Status.CANCELLED) { edges.run(frame) }
+            edges.run(frame).close()
             val people = ModelBundle.ofFolder(TestFiles.bundle.path)
             failure(Status.UNSUPPORTED) { maquette.edges(people) }
             failure(Status.NOT_FOUND) { maquette.edges(ModelBundle.ofFolder("/nowhere")) }
             edges.close()
-            assertClosed { edges.run(frame, intrinsics) }
+            assertClosed { edges.run(frame) }
         }
 
     @Test
@@ -165,7 +170,7 @@ class EdgesTest : AndroidTest() {
             val buffers = ModelBundle.ofBuffers(TestFiles.bundleInMemory(TestFiles.edgesBundle))
             val distances = maquette.edges(buffers).use { other ->
                 listOf(edges, other).map { model ->
-                    model.run(frame, intrinsics).use { it.copyPlane(EdgesResult.Plane.DISTANCE) }
+                    model.run(frame).use { it.copyPlane(EdgesResult.Plane.DISTANCE) }
                 }
             }
             assertArrayEquals(distances[0], distances[1], 0f)

@@ -33,6 +33,7 @@ internal object Native {
         timestampNs: Long,
         clock: Int,
         sequence: Long,
+        intrinsics: DoubleArray?,
     ): Long
 
     /** Buffers of Y, U and V, and of each its row stride and pixel stride. */
@@ -56,6 +57,7 @@ internal object Native {
 
     /** Horizon, age, and timestamp and sequence of the captured frame; null: no predicted frame. */
     @JvmStatic external fun originOfFrame(frame: Long): LongArray?
+    @JvmStatic external fun intrinsicsOfFrame(frame: Long): DoubleArray?
     @JvmStatic external fun copyFramePixels(frame: Long, format: Int, pixels: ByteBuffer)
 
     /** Depth in metres; writes its width and height. Null: the frame has none. */

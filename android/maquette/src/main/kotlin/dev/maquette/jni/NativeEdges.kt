@@ -18,11 +18,11 @@ internal object NativeEdges {
     ): Long
 
     @JvmStatic external fun destroy(edges: Long)
-    @JvmStatic external fun run(edges: Long, frame: Long, intrinsics: DoubleArray): Long
+    @JvmStatic external fun run(edges: Long, frame: Long): Long
     @JvmStatic external fun cancel(edges: Long)
 
     @JvmStatic external fun releaseResult(result: Long)
-    @JvmStatic external fun saveResult(result: Long, folder: ByteArray, stem: ByteArray)
+    @JvmStatic external fun saveResult(result: Long, path: ByteArray)
     @JvmStatic external fun fieldOfResult(result: Long): DoubleArray
     @JvmStatic external fun planeOfResult(result: Long, plane: Int, valueBytes: Int): ByteBuffer
     @JvmStatic external fun statsOfResult(result: Long): DoubleArray

@@ -1,4 +1,4 @@
-#include "edges/resting_depth.h"
+#include "edges/depth_average.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@ namespace maq {
 namespace {
 
 constexpr int kArea_px = 32;
-constexpr int kMinKnown_px = 16;  // pixels of an area that both have, to tell what is motion there
-constexpr double kTrim = 4;  // mean absolute differences, beyond which a pixel has jumped and tells nothing of the rest
-// The share of squared differences that a plane explains: of noise without relation 3 in 1,024; of that of stereo, of
-// which 7 x 7 pixels share one error, about 1 in 9.
+constexpr int kMinKnown_px = 16;  // pixels known in both, needed to detect motion in an area
+constexpr double kTrim = 4;       // mean absolute differences: beyond this a pixel has jumped and is ignored
+// The share of squared differences that a plane explains: for white noise 3 in 1,024; for stereo noise, where 7 x 7
+// pixels share one error, about 1 in 9.
 constexpr double kMotion = 0.4;
 constexpr float kJumpDifferences = 5;  // mean absolute differences: 4 standard deviations
 
@@ -39,9 +39,9 @@ struct Sums {
     size += std::abs(difference);
   }
 
-  // Whether they are those of a surface that moved.
+  // Returns whether the differences are from a surface that moved.
   bool is_motion() const {
-    if (n < kMinKnown_px) return true;  // nothing tells that it rests
+    if (n < kMinKnown_px) return true;  // too few to show that it is static
     const double cxx = xx - x * x / n, cxy = xy - x * y / n, cyy = yy - y * y / n;
     const double cxd = dx - x * d / n, cyd = dy - y * d / n;
     const double determinant = cxx * cyy - cxy * cxy;
@@ -55,13 +55,13 @@ struct Sums {
 
 }  // namespace
 
-struct RestingDepth::Area {
+struct DepthAverage::Area {
   int left, top, right, bottom;
 };
 
-RestingDepth::RestingDepth(int frames) : frames_(frames) {}
+DepthAverage::DepthAverage(int frames) : frames_(frames) {}
 
-int64_t RestingDepth::add(float* metres, const Intrinsics& camera, WorkerThreads& threads) {
+int64_t DepthAverage::add(float* metres, const Intrinsics& camera, WorkerThreads& threads) {
   if (frames_ == 1) return 0;
   if (!is_same(camera, camera_)) {
     camera_ = camera;
@@ -76,7 +76,7 @@ int64_t RestingDepth::add(float* metres, const Intrinsics& camera, WorkerThreads
   return total;
 }
 
-int64_t RestingDepth::add_row_of_areas(float* metres, int row) {
+int64_t DepthAverage::add_row_of_areas(float* metres, int row) {
   int64_t averaged = 0;
   const int top = row * kArea_px, bottom = std::min(top + kArea_px, camera_.height_px);
   for (int left = 0; left < camera_.width_px; left += kArea_px) {
@@ -85,13 +85,13 @@ int64_t RestingDepth::add_row_of_areas(float* metres, int row) {
   return averaged;
 }
 
-int64_t RestingDepth::add_area(float* metres, const Area& area) {
+int64_t DepthAverage::add_area(float* metres, const Area& area) {
   const auto for_each_pixel = [&](auto&& work) {
     for (int y = area.top; y < area.bottom; ++y) {
       for (int x = area.left; x < area.right; ++x) work(x, y, size_t(y) * size_t(camera_.width_px) + size_t(x));
     }
   };
-  // Two rounds, the second without what jumped.
+  // Two rounds; the second one ignores pixels that jumped.
   Sums sums;
   double limit = HUGE_VAL;
   for (int round = 0; round < 2; ++round) {

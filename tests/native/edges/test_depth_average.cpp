@@ -1,5 +1,5 @@
 // The mean of depth over frames of a camera at rest.
-#include "edges/resting_depth.h"
+#include "edges/depth_average.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "edges/edges.h"
 #include "support/samples/tiny_edges.h"
 
-namespace resting_depth {
+namespace depth_average {
 namespace {
 
 constexpr int kWide = 150, kHigh = 100;
@@ -35,10 +35,10 @@ Depth frame(double noise_r, unsigned seed, double nearer = 0) {
   return depth;
 }
 
-class RestingDepth : public ::testing::Test {
+class DepthAverage : public ::testing::Test {
  protected:
-  int64_t add(Depth& depth, maq::RestingDepth& resting, const maq::Intrinsics& camera = kCamera) {
-    return resting.add(depth.data(), camera, workers_);
+  int64_t add(Depth& depth, maq::DepthAverage& average, const maq::Intrinsics& camera = kCamera) {
+    return average.add(depth.data(), camera, workers_);
   }
 
   maq::WorkerThreads workers_{2};
@@ -56,12 +56,12 @@ double error_of(const Depth& depth, double nearer = 0) {
   return std::sqrt(squares / double(depth.size()));
 }
 
-TEST_F(RestingDepth, NoiseFallsWithTheRootOfTheFramesAndNoFurtherThanAsked) {
-  maq::RestingDepth resting(16);
+TEST_F(DepthAverage, NoiseFallsWithTheRootOfTheFramesAndNoFurtherThanAsked) {
+  maq::DepthAverage average(16);
   std::vector<double> errors;
   for (unsigned k = 0; k < 64; ++k) {
     Depth depth = frame(1, k);
-    const int64_t averaged = add(depth, resting);
+    const int64_t averaged = add(depth, average);
     EXPECT_GE(averaged, k == 0 ? 0 : kWide * kHigh * 99 / 100);
     EXPECT_EQ(averaged == 0, k == 0);
     errors.push_back(error_of(depth));
@@ -72,32 +72,32 @@ TEST_F(RestingDepth, NoiseFallsWithTheRootOfTheFramesAndNoFurtherThanAsked) {
   EXPECT_GT(errors[63], 0.12);  // the mean of all would have 0.125; of the last 16 with fading 0.18
 }
 
-TEST_F(RestingDepth, WhatMovesIsShownAsItIs) {
+TEST_F(DepthAverage, WhatMovesIsShownAsItIs) {
   for (const double noise_r : {0.0, 0.5}) {
-    maq::RestingDepth resting(16);
+    maq::DepthAverage average(16);
     for (unsigned k = 0; k < 12; ++k) {
       Depth depth = frame(noise_r, k);
-      add(depth, resting);
+      add(depth, average);
     }
     Depth moved = frame(noise_r, 100, 0.05);  // 10 footprints towards the camera
     const Depth given = moved;
-    EXPECT_EQ(add(moved, resting), 0);
+    EXPECT_EQ(add(moved, average), 0);
     EXPECT_EQ(moved, given);
   }
 }
 
 // By less than the noise in each frame, so that none of them tells it from noise.
-TEST_F(RestingDepth, FallsBehindASlowMotionByNoMoreThanTheNoise) {
-  maq::RestingDepth resting(64);
+TEST_F(DepthAverage, FallsBehindASlowMotionByNoMoreThanTheNoise) {
+  maq::DepthAverage average(64);
   double nearer = 0;
   for (unsigned k = 0; k < 120; ++k, nearer += 0.0005) {  // a tenth of a footprint a frame
     Depth depth = frame(1, k, nearer);
-    add(depth, resting);
+    add(depth, average);
     EXPECT_LT(error_of(depth, nearer), 1.3) << k;
   }
 }
 
-TEST_F(RestingDepth, ATurnAboutTheMiddleOfAnAreaIsMotion) {
+TEST_F(DepthAverage, ATurnAboutTheMiddleOfAnAreaIsMotion) {
   const auto turned = [](double angle) {
     Depth depth;
     for (int y = 0; y < kHigh; ++y) {
@@ -105,20 +105,20 @@ TEST_F(RestingDepth, ATurnAboutTheMiddleOfAnAreaIsMotion) {
     }
     return depth;
   };
-  maq::RestingDepth resting(16);
+  maq::DepthAverage average(16);
   for (int k = 0; k < 6; ++k) {
     Depth depth = turned(0.02 * k);
     const Depth given = depth;
-    EXPECT_EQ(add(depth, resting), 0);
+    EXPECT_EQ(add(depth, average), 0);
     EXPECT_EQ(depth, given);
   }
 }
 
-TEST_F(RestingDepth, AThingThatMovesLeavesTheRestAsSteadyAsItWas) {
-  maq::RestingDepth resting(16);
+TEST_F(DepthAverage, AThingThatMovesLeavesTheRestAsSteadyAsItWas) {
+  maq::DepthAverage average(16);
   for (unsigned k = 0; k < 16; ++k) {
     Depth depth = frame(0.5, k);
-    add(depth, resting);
+    add(depth, average);
   }
   Depth depth = frame(0.5, 77);
   const auto hand = [](int x, int y) { return x >= 5 && x < 15 && y >= 5 && y < 15; };
@@ -127,7 +127,7 @@ TEST_F(RestingDepth, AThingThatMovesLeavesTheRestAsSteadyAsItWas) {
       if (hand(x, y)) depth[size_t(y * kWide + x)] = 0.8f;
     }
   }
-  add(depth, resting);
+  add(depth, average);
   double squares = 0, count = 0;
   for (int y = 0; y < kHigh; ++y) {
     for (int x = 0; x < kWide; ++x) {
@@ -144,42 +144,42 @@ TEST_F(RestingDepth, AThingThatMovesLeavesTheRestAsSteadyAsItWas) {
   EXPECT_LT(std::sqrt(squares / count), 0.25);
 }
 
-TEST_F(RestingDepth, UnknownStaysUnknownAndWhatComesBackHasItsMean) {
-  maq::RestingDepth resting(8);
+TEST_F(DepthAverage, UnknownStaysUnknownAndWhatComesBackHasItsMean) {
+  maq::DepthAverage average(8);
   for (unsigned k = 0; k < 8; ++k) {
     Depth depth = frame(0.5, k);
     for (size_t at = 0; at < depth.size(); at += 7) depth[at] = k % 2 == 1 ? 0 : depth[at];
     const Depth given = depth;
-    add(depth, resting);
+    add(depth, average);
     for (size_t at = 0; at < depth.size(); ++at) EXPECT_EQ(depth[at] == 0, given[at] == 0);
   }
   Depth none(size_t(kWide) * kHigh, 0);
-  EXPECT_EQ(add(none, resting), 0);
+  EXPECT_EQ(add(none, average), 0);
   EXPECT_EQ(none, Depth(none.size(), 0));
 }
 
-TEST_F(RestingDepth, AnotherSizeOrCameraBeginsAnewAndOneFrameAloneStays) {
-  maq::RestingDepth resting(8), alone(1);
+TEST_F(DepthAverage, AnotherSizeOrCameraBeginsAnewAndOneFrameAloneStays) {
+  maq::DepthAverage average(8), alone(1);
   for (unsigned k = 0; k < 3; ++k) {
     Depth depth = frame(0.5, k);
     const Depth given = depth;
     EXPECT_EQ(add(depth, alone), 0);
     EXPECT_EQ(depth, given);
-    add(depth, resting);
+    add(depth, average);
   }
   maq::Intrinsics other = kCamera;
   other.fx_px += 1;
   Depth depth = frame(0.5, 9);
   const Depth given = depth;
-  EXPECT_EQ(add(depth, resting, other), 0);
+  EXPECT_EQ(add(depth, average, other), 0);
   EXPECT_EQ(depth, given);
   Depth small(17 * 31, 1);
-  EXPECT_EQ(add(small, resting, {17, 31, 40, 40, 8, 15}), 0);
-  EXPECT_EQ(add(small, resting, {17, 31, 40, 40, 8, 15}), 17 * 31);
+  EXPECT_EQ(add(small, average, {17, 31, 40, 40, 8, 15}), 0);
+  EXPECT_EQ(add(small, average, {17, 31, 40, 40, 8, 15}), 17 * 31);
 }
 
-TEST_F(RestingDepth, IsTheSameForAnyNumberOfThreads) {
-  maq::RestingDepth one(16), many(16);
+TEST_F(DepthAverage, IsTheSameForAnyNumberOfThreads) {
+  maq::DepthAverage one(16), many(16);
   maq::WorkerThreads single(1), several(3);
   for (unsigned k = 0; k < 5; ++k) {
     Depth first = frame(1, k), second = first;
@@ -189,7 +189,7 @@ TEST_F(RestingDepth, IsTheSameForAnyNumberOfThreads) {
 }
 
 // The field's own depth is the mean, from which curves are made.
-TEST_F(RestingDepth, TheFieldIsThatOfTheMean) {
+TEST_F(DepthAverage, TheFieldIsThatOfTheMean) {
   const auto edges = tiny_edges::edges(1, 16);
   maq::EdgesResult result;
   for (unsigned k = 0; k < 16; ++k) {
@@ -201,4 +201,4 @@ TEST_F(RestingDepth, TheFieldIsThatOfTheMean) {
 }
 
 }  // namespace
-}  // namespace resting_depth
+}  // namespace depth_average

@@ -28,8 +28,8 @@ from maquette.scenes import Capture, PinholeCamera, Scene, SceneRenderer, View
 __all__ = [
     "Box", "Camera", "Capture", "Concealer", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
     "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person",
-    "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneRenderer", "Source", "View",
+    "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin",
+    "Person", "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneRenderer", "Source", "View",
     "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
 ]  # fmt: skip
 

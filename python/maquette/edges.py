@@ -20,8 +20,8 @@ CONVEXITIES = ("unknown", "convex", "concave")
 class Curve:
     """points_m: float64 [n, 3], a polyline along the curve, in the camera's coordinates. type: "line", "arc" or
     "spline". kind: "crease" or "boundary". convexity: "convex", "concave" or "unknown", for a crease. corners: indices
-    of the corners at its start and its end, -1 for a free end. rms_footprints: root mean square distance of the measured
-    points from the curve, in footprints r."""
+    of the corners at its start and its end, -1 for a free end. rms_footprints: root mean square distance of the
+    measured points from the curve, in footprints r."""
 
     points_m: np.ndarray
     type: str
@@ -96,8 +96,8 @@ class Curves(NativeObject):
 class EdgesResult:
     """Planes [H, W] of a depth image. distance_r: float32, distance to the nearest sharp curve in footprints r; eps_r
     where no curve is nearer. expected_error_r: float32, predicted mean absolute error of distance_r. kind: uint8 (0
-    none, 1 crease, 2 boundary). distance_m: float32, 0 where depth is unknown. curves: None unless requested. stats: the
-    fields of maq_edges_stats."""
+    none, 1 crease, 2 boundary). distance_m: float32, 0 where depth is unknown. curves: None unless requested. stats:
+    the fields of maq_edges_stats."""
 
     distance_r: np.ndarray
     expected_error_r: np.ndarray

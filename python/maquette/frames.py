@@ -81,8 +81,8 @@ class Frame(NativeObject):
 
     `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), uint8 [H, W]
     (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Don't write to the array while a
-    model reads it. intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the time,
-    the number and, if they are known, the intrinsics of the camera.
+    model reads it. intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the
+    time, the number and, if they are known, the intrinsics of the camera.
     """
 
     def __init__(

@@ -23,8 +23,8 @@ class FrameBudget {
   // `full`: the settings of the app; the budget begins with them and never exceeds them.
   FrameBudget(double budget_ms, const DensePoseQuality& full);
 
-  // Adds a frame of a stream: when it was done, and how long it took. Returns true if quality() changed. Times do not go
-  // back.
+  // Adds a frame of a stream: when it was done, and how long it took. Returns true if quality() changed. Times do not
+  // go back.
   bool add(MonotonicClock::time_point time, double run_ms);
 
   const DensePoseQuality& quality() const { return levels_[level_]; }

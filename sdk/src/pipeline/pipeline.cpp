@@ -69,7 +69,7 @@ class EventRate {
 
 // The latest wishes of callers. The numbers count the changes.
 struct Request {
-  std::string uri;  // "": no source
+  std::string uri;                      // "": no source
   std::shared_ptr<LiveModelUse> model;  // nullptr: none runs
   std::string recording;
   uint64_t source_number = 0, model_number = 1, recording_number = 0;

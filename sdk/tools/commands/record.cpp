@@ -91,7 +91,8 @@ void add_record_command(CLI::App& app, int* exit_code) {
   command->add_flag("--keep-predicted", options->keep_predicted,
                     "Also record predicted frames, with a mark; default: they are an error");
   command->footer(
-      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. A recording can be played even\n"
+      "Frames keep their times, numbers, depth and intrinsics. Ctrl-C ends a recording. A recording can be played "
+      "even\n"
       "after a crash or a power cut.\n\n"
       "  maquette record v4l2:/dev/video0 take.maqrec --seconds 10\n"
       "  maquette densepose take.maqrec --out results --overlay\n"

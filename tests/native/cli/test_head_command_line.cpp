@@ -36,8 +36,8 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   const Outcome result = run("grey.png --box 110,60,200,180 --out o/head.glb --save o/head.maqh --seconds 0 --cell 8");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.out.rfind("file:grey.png  head of 90 x 120 px  focal length ", 0), 0u) << result.out;
-  for (const char* text : {"px (estimated)", "size the average of heads, +- 4.1 %; pupils ", "mm apart",
-                           "encode ", "pose ", "o/head.glb: ", " triangles", "o/head.maqh"}) {
+  for (const char* text : {"px (estimated)", "size the average of heads, +- 4.1 %; pupils ", "mm apart", "encode ",
+                           "pose ", "o/head.glb: ", " triangles", "o/head.maqh"}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
   }
   EXPECT_EQ(read_text(folder_.file("o/head.glb")).substr(0, 4), "glTF");

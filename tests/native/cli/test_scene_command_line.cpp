@@ -216,8 +216,7 @@ TEST_F(SceneCommandLine, WrongUsageIsExitCodeTwoAndHelpTeaches) {
   for (const char* arguments :
        {"", "build", "build place", "build place --out a --coefficients 12", "build place --out a --points 0",
         "build place --out a --visibility-scale 2", "build place --out a --threads 0",
-        "render a.maqs --path round --out o", "render a.maqs --path orbit --fps 0 --out o",
-        "info"}) {
+        "render a.maqs --path round --out o", "render a.maqs --path orbit --fps 0 --out o", "info"}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments;
   }
   EXPECT_EQ(files(), std::set<std::string>{});

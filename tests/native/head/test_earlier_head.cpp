@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "head/fit/anchor_fit.h"
 #include "head/reconstruction/earlier_head.h"
 #include "head/reconstruction/known_anchors.h"
-#include "head/fit/anchor_fit.h"
 #include "head/synthetic_head.h"
 #include "support/expect_error.h"
 

@@ -84,7 +84,8 @@ maq_status maq_edges_model_create(maq_context* context, const maq_edges_config* 
     const EdgesSettings settings = edges_settings(config, "config");
     std::optional<CurveRequest> request;
     if (curves != nullptr) request = curve_request(curves, "curves");
-    *model = new maq_model(std::make_shared<EdgesModel>(context->state, bundle_reader(config.model, "config.model", kEdgesBundle),
+    *model = new maq_model(std::make_shared<EdgesModel>(context->state,
+                                                        bundle_reader(config.model, "config.model", kEdgesBundle),
                                                         settings, request, config.result_pool_size));
     return MAQ_OK;
   });

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "head/reconstruction/head_surface.h"
 #include "head/mesh/mesh_cleanup.h"
+#include "head/reconstruction/head_surface.h"
 #include "head/texture/texture_layout.h"
 #include "image/files/image_file.h"
 #include "image/files/jpeg.h"

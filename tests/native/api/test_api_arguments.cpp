@@ -116,7 +116,7 @@ TEST_F(ApiArguments, WhatOnlyCamerasOrRecordingsHaveIsRefusedOfOthers) {
                "info");
   expect_error(maq_source_get_intrinsics(source, &intrinsics), MAQ_ERROR_UNSUPPORTED, source, "intrinsics");
   expect_error(maq_source_seek(source, -1), MAQ_ERROR_INVALID_ARGUMENT, source, "negative");
-  expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "without depth");
+  expect_error(maq_frame_get_depth(frame, &desc), MAQ_ERROR_UNSUPPORTED, frame, "has no depth");
   expect_error(maq_frame_get_dma_buf(frame, &fd), MAQ_ERROR_UNSUPPORTED, frame, "dma-buf");
   expect_error(maq_frame_get_dma_buf(frame, nullptr), MAQ_ERROR_INVALID_ARGUMENT, frame, "fd is NULL");
   EXPECT_EQ(fd, -5);

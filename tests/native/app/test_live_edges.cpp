@@ -118,7 +118,7 @@ TEST(LiveEdges, ASourceWithoutDepthIsSaidInASentence) {
   EXPECT_NE(photo.find("without depth"), std::string::npos) << photo;
   EXPECT_EQ(photo.back(), '.');
   const std::string unknown = failure_of("image:" MAQ_TEST_MEDIA "/box_depth.png?depth_unit=0.001");
-  EXPECT_NE(unknown.find("field of view"), std::string::npos) << unknown;
+  EXPECT_NE(unknown.find("fov=60"), std::string::npos) << unknown;
   // A depth camera goes on from there.
   edges.live.open("stub:solids?frames=1");
   ASSERT_TRUE(wait_until([&] { return edges.seen().size() == 1; }));

@@ -16,10 +16,6 @@ namespace {
 
 constexpr uint32_t kResultPool = 4, kMaxResultPool = 64;
 
-size_t pool_size_of(const maq_edges_config& config) {
-  return config.result_pool_size == 0 ? kResultPool : config.result_pool_size;
-}
-
 maq_edges_config default_edges_config() {
   maq_edges_config config{};
   config.struct_size = sizeof config;
@@ -47,6 +43,10 @@ EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* na
   return settings;
 }
 
+uint32_t maq::result_pool_size_of(const maq_edges_config& config) {
+  return config.result_pool_size == 0 ? kResultPool : config.result_pool_size;
+}
+
 maq_status maq_edges_config_init(maq_edges_config* config, uint32_t struct_size) {
   return init_config(__func__, config, struct_size, default_edges_config());
 }
@@ -62,7 +62,7 @@ maq_status maq_edges_create(maq_context* context, const maq_edges_config* given,
     auto made = std::make_unique<Edges>(context->state->onnxruntime(), std::move(bundle), settings);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,
                                 ") loaded, ", made->threads(), " thread(s)");
-    *edges = new maq_edges(context->state, std::move(made), pool_size_of(config));
+    *edges = new maq_edges(context->state, std::move(made), result_pool_size_of(config));
     return MAQ_OK;
   });
 }

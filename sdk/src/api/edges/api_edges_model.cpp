@@ -86,7 +86,7 @@ maq_status maq_edges_model_create(maq_context* context, const maq_edges_config* 
     if (curves != nullptr) request = curve_request(curves, "curves");
     *model = new maq_model(std::make_shared<EdgesModel>(context->state,
                                                         bundle_reader(config.model, "config.model", kEdgesBundle),
-                                                        settings, request, config.result_pool_size));
+                                                        settings, request, result_pool_size_of(config)));
     return MAQ_OK;
   });
 }

@@ -18,6 +18,9 @@ maq_edges_config read_edges_config(const maq_edges_config* given, const char* na
 // Throws ArgumentError for a value out of range. `name` is the name of the config.
 EdgesSettings edges_settings(const maq_edges_config& config, const char* name);
 
+// Returns the number of results that the app may hold at once.
+uint32_t result_pool_size_of(const maq_edges_config& config);
+
 // Checks a config and converts it to a request; `name` begins error texts.
 CurveRequest curve_request(const maq_edges_curves_config* given, const char* name);
 

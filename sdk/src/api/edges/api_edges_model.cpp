@@ -12,7 +12,10 @@ using namespace maq;
 namespace {
 
 struct EdgesOutput : LiveOutput {
-  EdgesOutput() { set_held(false); }
+  EdgesOutput() {
+    edges.set_held(false);
+    curves.set_held(false);
+  }
   void set_held(bool is_held) noexcept override {
     edges.set_held(is_held);
     curves.set_held(is_held && has_curves);

@@ -3,7 +3,6 @@
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 #include <algorithm>
-#include <filesystem>
 #include <iterator>
 #include <utility>
 
@@ -109,9 +108,7 @@ std::optional<maquette::Pixel> EdgesView::pointer(const EdgesDrawing& drawing) c
 
 maquette::Saver::Companions EdgesView::companions() const {
   if (frame().result == nullptr) return nullptr;
-  return [result = frame().result, found = frame().found, formats = formats_](const std::string& folder,
-                                                                              const std::string& stem) {
-    const std::string path = (std::filesystem::path(folder) / stem).string();
+  return [result = frame().result, found = frame().found, formats = formats_](const std::string& path) {
     result->save(path);
     std::string names = "_distance.png, _kind.png, _edges.json";
     for (size_t i = 0; i < kFormats.size() && found != nullptr; ++i) {
@@ -184,10 +181,6 @@ void EdgesView::draw_model_options() {
   ImGui::SameLine(150 * window_.scale());
   ImGui::Text("network on %.0f %%",
               100.0 * double(frame().stats.network_pixel_count) / double(std::max<int64_t>(1, pixels)));
-  maq_spinning& spinning = model_.edges.model.spinning;
-  bool is_awake = spinning != MAQ_SPINNING_OFF;
-  changed |= ImGui::Checkbox("threads stay awake", &is_awake);
-  spinning = is_awake ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
   if (changed) live_.set_model(model_);
 }
 

@@ -130,8 +130,8 @@ std::string HeadView::message() const {
 maquette::Saver::Companions HeadView::companions() const {
   const auto fitted = live_.fitted();
   if (fitted == nullptr) return nullptr;
-  return [fitted](const std::string& folder, const std::string& stem) {
-    fitted->mesh.save(folder + "/" + stem + ".glb");
+  return [fitted](const std::string& path) {
+    fitted->mesh.save(path + ".glb");
     return ".glb";
   };
 }
@@ -164,7 +164,7 @@ void HeadView::add_to_report(nlohmann::ordered_json* report) const {
   json["head"] = {{"photos", head->photo_count},       {"used_photos", head->used_photo_count},
                   {"triangles", head->triangle_count}, {"pupil_distance_m", head->pupil_distance_m},
                   {"seconds", head->seconds},          {"rendering_ms", image().rendering_ms},
-                  {"is_over_photo", shows_slider()},   {"shading", kShadingNames[size_t(wanted_.shading) - 1]}};
+                  {"is_over_photo", shows_slider()},   {"shading", kShadingNames[size_t(wanted_.shading)]}};
 }
 
 Action HeadView::draw_panel() {

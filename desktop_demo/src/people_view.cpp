@@ -4,7 +4,6 @@
 #include <imgui.h>
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <iterator>
 #include <maquette/densepose_mesh.hpp>
 #include <thread>
@@ -112,8 +111,8 @@ void PeopleView::draw_boxes() const {
 
 maquette::Saver::Companions PeopleView::companions() const {
   if (frame().result == nullptr) return nullptr;
-  return [result = frame().result](const std::string& folder, const std::string& stem) {
-    result->save((std::filesystem::path(folder) / stem).string());
+  return [result = frame().result](const std::string& path) {
+    result->save(path);
     return "_IUV.png, _INDS.png and .json";
   };
 }
@@ -185,11 +184,6 @@ void PeopleView::draw_model_options() {
   int crops = int(model_.person_crops);
   if (ImGui::Combo("crops of people", &crops, "off\0small or leaning\0all\0")) {
     model_.person_crops = maq_densepose_crops(crops);
-    changed = true;
-  }
-  bool spins = model_.model.spinning != MAQ_SPINNING_OFF;
-  if (ImGui::Checkbox("threads stay awake", &spins)) {
-    model_.model.spinning = spins ? MAQ_SPINNING_ON : MAQ_SPINNING_OFF;
     changed = true;
   }
   if (changed) live_.set_model(model_);

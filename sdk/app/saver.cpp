@@ -23,7 +23,7 @@ void Saver::save_snapshot(RgbaImage image, Companions companions) {
   run([this, path = new_path(""), kept, companions = std::move(companions)] {
     kept->as_frame(context_).save(path + ".png");
     if (companions == nullptr) return "Saved " + path + ".png";
-    return "Saved " + path + ".png, " + companions(folder_, fs::path(path).filename().string());
+    return "Saved " + path + ".png, " + companions(path);
   });
 }
 

@@ -25,9 +25,9 @@ class Saver {  // all calls by one thread
   Saver(const Saver&) = delete;
   Saver& operator=(const Saver&) = delete;
 
-  // Writes what belongs to a snapshot into the folder, in files whose names begin with the stem; returns how these go
-  // on, for the message.
-  using Companions = std::function<std::string(const std::string& folder, const std::string& stem)>;
+  // Writes the files that belong to a snapshot, whose paths begin with `path`. Returns the rest of their names for the
+  // message.
+  using Companions = std::function<std::string(const std::string& path)>;
   // A PNG of the image, and `companions`, which may be null.
   void save_snapshot(RgbaImage image, Companions companions);
 

@@ -59,7 +59,7 @@ int build(const BuildOptions& options) {
   print_error("%s: %u photos, %" PRIu64 " points\n", options.capture.c_str(), info.view_count, info.point_count);
   for (uint32_t i = 0; i < info.drop_count; ++i) {
     const maq_capture_drop drop = capture.drop(i);
-    print_error("  dropped: %" PRIu64 " %s\n", drop.count, drop.reason);
+    print_error("  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
   const std::string networks = scene_bundle_or_default(options.bundle);
   for (const std::string* path : {&options.out, &options.ply}) {

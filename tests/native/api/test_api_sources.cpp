@@ -295,14 +295,16 @@ TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
   const std::string image = "image:" + sdk.beside("a.png");
   write_text(sdk.beside("a.png"), "\x89PNG\r\n\x1a\n");  // that it is damaged comes later
   const std::string video = "video:" + sdk.beside("libmaquette.so");
-  for (const char* uri : {"stub:people", "image:" MAQ_TEST_MEDIA "/photo.jpg"}) {
+  for (const char* uri : {"stub:pattern", "image:" MAQ_TEST_MEDIA "/photo.jpg"}) {
     EXPECT_EQ(sdk.open(uri), MAQ_OK) << sdk.last_error();
   }
   for (const std::string& uri : {image, video}) {
     EXPECT_EQ(sdk.open(uri.c_str()), MAQ_ERROR_RUNTIME_LIBRARY);
     EXPECT_NE(sdk.last_error().find("maquette/libmaquette_files.so"), std::string::npos) << sdk.last_error();
   }
-  EXPECT_EQ(sdk.open("stub:people"), MAQ_OK) << sdk.last_error();
+  EXPECT_EQ(sdk.open("stub:pattern"), MAQ_OK) << sdk.last_error();
+  EXPECT_EQ(sdk.open("stub:people"), MAQ_ERROR_NOT_FOUND) << "an app does not carry the sprites";
+  EXPECT_NE(sdk.last_error().find("share/maquette/stub/people.jpg"), std::string::npos) << sdk.last_error();
 
   std::filesystem::create_directory(sdk.beside("maquette"));
   const std::string library = sdk.beside("maquette/libmaquette_files.so");

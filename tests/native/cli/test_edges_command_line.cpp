@@ -162,7 +162,8 @@ TEST_F(EdgesCommandLine, WhatHasNoDepthNoCalibrationOrNoBundleIsASentence) {
 
 TEST_F(EdgesCommandLine, WithoutAFolderResultsAreOnlyPrinted) {
   const std::string source = "'image:depth.png?depth_unit=0.001&fov=60' ";
-  const auto before = files("");
+  run(source);
+  const auto before = files("");  // with the files that hold the output of a run
   const Outcome printed = run(source + "--boxes");
   EXPECT_EQ(printed.exit_code, 0) << printed.err;
   EXPECT_NE(printed.out.find("box"), std::string::npos) << printed.out;

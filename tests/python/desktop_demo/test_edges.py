@@ -144,7 +144,7 @@ def test_without_a_source_solids_are_shown(tmp_path):
     ("options", "word"),
     [
         ((ROOT / "tests/media/photo.jpg",), "without depth"),
-        ((f"image:{ROOT}/tests/media/box_depth.png?depth_unit=0.001",), "field of view"),
+        ((f"image:{ROOT}/tests/media/box_depth.png?depth_unit=0.001",), "fov=60"),
         (("--source", "stub:solids?unplug@3"), "solids"),
         (("--edges-bundle", "missing-bundle"), "missing-bundle"),
         (("--layer", "x-ray"), "x-ray"),

@@ -56,7 +56,7 @@ def test_the_wheel_runs_without_the_checkout(wheel, tmp_path):
 
 
 def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
-    assert re.fullmatch(r"maquette-0\.2\.0-py3-none-manylinux_\d+_\d+_\w+\.whl", wheel.name)
+    assert re.fullmatch(r"maquette-0\.3\.0-py3-none-manylinux_\d+_\d+_\w+\.whl", wheel.name)
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         metadata = archive.read("maquette-0.3.0.dist-info/METADATA").decode()

@@ -200,7 +200,7 @@ class ConcealerTest : AndroidTest() {
         }
         live("fps=50").use { source ->
             val wrong = listOf(
-                Concealer.Config(maxGapMs = 0) to "max_gap_ms",
+                Concealer.Config(maxGapMs = -1) to "max_gap_ms",
                 Concealer.Config(maxGapMs = 10_001) to "max_gap_ms",
                 Concealer.Config(threads = 65) to "threads",
                 Concealer.Config(framePoolSize = -1) to "frame_pool_size",

@@ -6,6 +6,7 @@
 # network and some minutes. Without a network the demo says so and goes on; REAL=no leaves the capture out.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+[ -t 2 ] || export TQDM_DISABLE=1  # progress bars are for terminals
 out="${1:-demo-output}"
 maquette=build/release/stage/bin/maquette
 places=.data/places/real

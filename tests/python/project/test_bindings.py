@@ -1,4 +1,4 @@
-"""Each public C function can be called from C++, Kotlin and Python, or stands in unbound_functions.toml with a reason."""
+"""Each public C function is bound in C++, Kotlin and Python, or stands in unbound_functions.toml with a reason."""
 
 import re
 import tomllib

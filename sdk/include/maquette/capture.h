@@ -22,7 +22,7 @@ typedef struct maq_capture_info {
 /* A photo of the capture. The text is the capture's. */
 typedef struct maq_capture_view {
   uint32_t struct_size;
-  int32_t is_held_out;       /* 1: for comparison only; maq_scene_build does not use it by default */
+  int32_t is_held_out;       /* 1: held out for comparison; maq_scene_build does not use it by default */
   const char* name;          /* of the photo in the capture */
   maq_pinhole_camera camera; /* of the photo after undistortion */
   int32_t has_depth;         /* 1: the view also has a depth image, see maq_capture_load_depth */
@@ -31,7 +31,7 @@ typedef struct maq_capture_view {
 /* Parts of the capture that cannot be used. The text is the capture's. */
 typedef struct maq_capture_drop {
   uint32_t struct_size;
-  const char* reason; /* with the first part: "photos without a camera (first: images/7.jpg)" */
+  const char* reason; /* with the first example: "photos without a camera (first: images/7.jpg)" */
   uint64_t count;     /* of the parts */
 } maq_capture_drop;
 
@@ -62,16 +62,16 @@ MAQ_API maq_status maq_capture_get_view(const maq_capture* capture, uint32_t ind
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t index, maq_capture_drop* drop);
 
-/* Reads the photo of a view and undistorts it: MAQ_PIXEL_BGR8, in the size of the view's camera. The caller owns
- * `*frame`; give it to maq_frame_release.
+/* Reads the photo of the view at `index`, below view_count, and undistorts it. The frame is MAQ_PIXEL_BGR8, in the size
+ * of the view's camera. The caller owns `*frame`; give it to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED,
  * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
 MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
 
-/* Reads the depth image of a view, MAQ_PIXEL_DEPTH16 or MAQ_PIXEL_DEPTH32F in units of the scene, and its camera. The
- * camera has the pose of the photo and the size of the depth image. The caller sets camera->struct_size. The caller
- * owns
- * `*frame`; give it to maq_frame_release.
+/* Reads the depth image of the view at `index`, below view_count, and its camera. MAQ_PIXEL_DEPTH32F is in units of the
+ * scene. MAQ_PIXEL_DEPTH16 is in thousandths of that unit, which are millimetres if the unit is a metre. `*camera` gets
+ * the pose of the photo and the size of the depth image. The caller sets camera->struct_size. The caller owns `*frame`;
+ * give it to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (also: the view has no depth),
  * MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED (not a depth image, a lens with distortion), MAQ_ERROR_IMAGE_SIZE,
  * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the image is read. */

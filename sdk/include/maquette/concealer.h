@@ -1,4 +1,4 @@
-/* Error concealment: a live source whose short gaps are filled with predicted frames. */
+/* Error concealment: fills short gaps of a live source with predicted frames. */
 #ifndef MAQUETTE_CONCEALER_H_
 #define MAQUETTE_CONCEALER_H_
 
@@ -16,8 +16,10 @@ extern "C" {
  *
  *   maq_source_create(context, "camera:", NULL, &source);
  *   maq_concealer_create(context, source, NULL, &concealer);
- *   while (maq_concealer_acquire_frame(concealer, MAQ_WAIT_FOREVER, &frame) == MAQ_OK) { ... maq_frame_release(frame);
- * }
+ *   while (maq_concealer_acquire_frame(concealer, MAQ_WAIT_FOREVER, &frame) == MAQ_OK) {
+ *     ... read the frame ...
+ *     maq_frame_release(frame);
+ *   }
  */
 typedef struct maq_concealer maq_concealer;
 

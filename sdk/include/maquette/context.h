@@ -46,7 +46,7 @@ MAQ_API maq_status maq_context_config_init(maq_context_config* config, uint32_t 
  * Any thread. Errors: MAQ_ERROR_VERSION_MISMATCH, MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_context_create(uint32_t header_version, const maq_context_config* config, maq_context** context);
 
-/* Destroys the context (NULL is fine). Objects created from it may outlive it: they keep what they need.
+/* Destroys the context (NULL is fine). Objects created from it may outlive it.
  * Once for each context, from any thread. Does not block. */
 MAQ_API void maq_context_destroy(maq_context* context);
 

@@ -17,7 +17,7 @@ typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_PART = 1     /* only the part: faster; U and V stay 0 */
 } maq_densepose_detail;
 
-/* The people whose surface is computed a second time, in a crop of the frame at full resolution. A crop is rotated
+/* Selects the people who are mapped a second time, in a crop of the frame at full resolution. The crop is rotated
  * upright by the body axis of the first surface. Crops find more of hands, and of people who lean or are far away. Each
  * crop takes about as long as a small frame. */
 typedef enum maq_densepose_crops {
@@ -35,11 +35,13 @@ typedef struct maq_densepose_config {
   int32_t max_people;         /* 1 to 255, best scores first; 0 (default): the bundle's value */
   int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes
                                  are faster and may miss people in a crowd. */
-  int32_t key_frame_interval; /* 0 (default) and 1: people are detected in every frame. N, up to 1000: in every N-th
-                                 frame of a stream. In between, boxes are propagated and no new people are found; frames
-                                 without people cost nothing. A frame of another size is a key frame. If everybody has
-                                 a crop (`person_crops`), only the crops are computed in between. */
-  int32_t min_person_height_px;     /* people less tall than this in the frame may be missed; 0 (default): no limit */
+  int32_t key_frame_interval; /* 0 (default) and 1: every frame is a key frame, in which people are detected. N, up to
+                                 1000: every N-th frame of a stream is one. In between, boxes are propagated and no new
+                                 people are found; frames without people cost nothing. A frame of another size or of
+                                 another roll is a key frame. If each person has a crop (`person_crops`), only the crops
+                                 are computed in between. */
+  int32_t min_person_height_px;     /* people less tall than this in the frame may be missed, up to 100000; larger is
+                                       faster; 0 (default): no limit */
   maq_densepose_detail detail;      /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
   maq_densepose_crops person_crops; /* default MAQ_DENSEPOSE_CROPS_OFF */
   int32_t person_crop_px;           /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
@@ -50,7 +52,7 @@ typedef struct maq_densepose_person {
   uint32_t struct_size;
   float score;     /* 0 to 1 */
   float box_px[4]; /* in pixels of the frame: left, top, right, bottom; right and bottom are exclusive */
-  int64_t id;      /* the same in each frame that shows the person; MAQ_NO_ID in this version */
+  int64_t id;      /* for tracking; always MAQ_NO_ID in this version */
 } maq_densepose_person;
 
 /* The planes of a result: one byte a pixel of the frame. */
@@ -69,7 +71,7 @@ MAQ_API const char* maq_densepose_get_part_name(int32_t part);
  * Any thread. Does not fail (NULL is fine) or block. */
 MAQ_API void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]);
 
-/* Times of the stages of a run, in milliseconds of wall-clock time, and counts. */
+/* Wall-clock times of the stages of a run in milliseconds, and counts. */
 typedef struct maq_densepose_stats {
   uint32_t struct_size;
   float preprocess_ms; /* resize and normalise */
@@ -83,15 +85,15 @@ typedef struct maq_densepose_stats {
   int32_t network_width_px; /* the resized image, without padding */
   int32_t network_height_px;
   int32_t proposal_count;      /* boxes that reached the box head */
-  int32_t person_count;        /* in the result */
-  int32_t crop_count;          /* crops of people that were computed (maq_densepose_crops) */
+  int32_t person_count;        /* people in the result */
+  int32_t crop_count;          /* computed crops of people (maq_densepose_crops) */
   int32_t dropped_box_count;   /* boxes with NaN, or with no area inside the frame */
   int64_t body_pixel_count;    /* pixels that belong to a person */
   int64_t clamped_pixel_count; /* body pixels where the network's U or V was outside 0 to 1 */
   int32_t is_key_frame;        /* 1: people were detected; 0: boxes of the previous frame were propagated */
-  maq_provider provider;       /* in use for the trunk */
-  int32_t threads;             /* in use for the networks; fewer where the system starts no more (see the log) */
-  int32_t is_threads_measured; /* 1: MAQ_THREADS_MEASURED chose that number */
+  maq_provider provider;       /* provider in use for the trunk */
+  int32_t threads;             /* threads of the networks; fewer if the system starts no more (see the log) */
+  int32_t is_threads_measured; /* 1: MAQ_THREADS_MEASURED chose the number of threads */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -109,21 +111,24 @@ MAQ_API maq_status maq_densepose_create(maq_context* context, const maq_densepos
  * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_densepose_destroy(maq_densepose* densepose);
 
-/* Finds the people in a frame and maps their pixels to the body surface. The frame is not kept. `*result` comes from a
- * pool of result_pool_size: give it back with maq_densepose_result_release. If there are no people, no head network
- * runs and the planes are zero. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY,
+/* Finds the people in a frame and maps their pixels to the body surface. The frame may have any pixel format except
+ * depth. It is not kept. `*result` comes from a pool of result_pool_size: give it back with
+ * maq_densepose_result_release. If no people are found, the dense head does not run and the planes are zero. After an
+ * error the next frame is a key frame.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (a depth image), MAQ_ERROR_POOL_EMPTY,
  * MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks while the networks run. */
 MAQ_API maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, maq_densepose_result** result);
 
-/* Cancels the current maq_densepose_run, or the next one if none runs. The call returns MAQ_CANCELLED when the current
- * layer of its network is done. Later runs work as usual; the next frame is a key frame.
+/* Cancels the running maq_densepose_run, or else the next one. It returns MAQ_CANCELLED after the current layer of its
+ * network. Later runs are not affected; the next frame is a key frame.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_cancel(maq_densepose* densepose);
 
-/* Sets the roll of the camera for the next frames: the frames show the world rotated clockwise by `roll_rad`, -7 to 7;
- * 0 at first. At 0.5, a standing person's head is to the upper right of the feet. The networks know upright people, so
- * that frames are rotated upright for them, in steps of 15 degrees. Results stay in pixels of the frame. The input
- * around a rotated frame is larger: halfway between upright and sideways it takes twice as long.
+/* Sets the roll of the camera for the next frames, which show the world rotated clockwise by `roll_rad`: -7 to 7
+ * radians, 0 at first. At 0.5, the head of a standing person is to the upper right of the feet. The networks are
+ * trained on upright people. The library therefore rotates each frame upright for them, in steps of 15 degrees. Results
+ * stay in pixels of the frame. The input around a rotated frame is larger: halfway between upright and sideways it
+ * takes twice as long. A change of the step makes the next frame a key frame.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_set_roll(maq_densepose* densepose, float roll_rad);
 
@@ -135,7 +140,7 @@ MAQ_API maq_status maq_densepose_reset(maq_densepose* densepose);
  * Once for each result, from any thread. Does not block. */
 MAQ_API void maq_densepose_result_release(maq_densepose_result* result);
 
-/* Gets the size of the planes, which is the frame's. Either pointer may be NULL.
+/* Gets the size of the planes, which is the size of the frame. Either pointer may be NULL.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_size(const maq_densepose_result* result, int32_t* width_px,
                                                  int32_t* height_px);
@@ -156,13 +161,14 @@ MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* r
 MAQ_API maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result, uint32_t index,
                                                      float box_px[4]);
 
-/* Gets a plane: height_px rows of `*stride_bytes` bytes, inside the result. If people overlap, the person with the
- * better score is in front.
+/* Gets a plane: height_px rows of `*stride_bytes` bytes (maq_densepose_result_get_size). The pixels are inside the
+ * result and valid until it is released. Neither pointer may be NULL. If people overlap, the person with the better
+ * score is in front.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                                   const uint8_t** pixels, size_t* stride_bytes);
 
-/* Gets times and counts of the run. The caller sets stats->struct_size.
+/* Gets times and counts of the run that made the result. The caller sets stats->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
@@ -172,13 +178,13 @@ MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* re
 /* Options of maq_densepose_result_draw. */
 typedef struct maq_densepose_drawing {
   uint32_t struct_size;
-  int32_t x_px; /* left upper corner of the part that is drawn; 0 (default): the frame's corner */
+  int32_t x_px; /* top left corner of the drawn part of the frame; 0 (default): the frame's corner */
   int32_t y_px;
   int32_t width_px;    /* 0 (default): up to the frame's right edge */
   int32_t height_px;   /* 0 (default): down to the frame's lower edge */
-  int32_t opacity;     /* of the colours, 1 to 255 (they cover the frame); 0 (default): 180; or
+  int32_t opacity;     /* opacity of the colours, 1 to 255 (they cover the frame); 0 (default): 180; or
                             MAQ_DENSEPOSE_INVISIBLE */
-  int32_t is_mirrored; /* 1: left and right change sides, as in a mirror; default 0 */
+  int32_t is_mirrored; /* 1: left and right are exchanged, as in a mirror; default 0 */
 } maq_densepose_drawing;
 
 /* Fills `drawing` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_drawing) of the caller.
@@ -199,24 +205,24 @@ MAQ_API maq_status maq_densepose_result_draw(const maq_densepose_result* result,
  *   <path>_IUV.png   channels I, U * 255, V * 255 in the file's order B, G, R
  *   <path>_INDS.png  MAQ_DENSEPOSE_PLANE_PERSON
  *   <path>.json      size, boxes, scores
- * The folder of `path` exists. Files of these names are replaced, each atomically, after all have been written.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY
- * (libmaquette_files.so is missing). Blocks while they are written. */
+ * The folder of `path` must exist. Existing files are replaced atomically, after all three have been written.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (`path` is empty or ends with '/'), MAQ_ERROR_UNWRITABLE,
+ * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* path);
 
 /* The points of the template body in its rest pose, for each part, U and V. In metres: x to the body's left, y to its
  * back, z up. */
 typedef struct maq_densepose_surface {
   uint32_t struct_size;
-  int32_t nodes;         /* along U, and along V; at least 2 */
+  int32_t nodes;         /* number of nodes along U, and along V; at least 2 */
   const float* points_m; /* [24][nodes][nodes][3]: part - 1, U * (nodes - 1), V * (nodes - 1); x, y, z. Interpolate
                             between nodes bilinearly. x, y and z are NaN outside the chart of the part. */
 } maq_densepose_surface;
 
 /* Gets the surface that the bundle's labels refer to. The caller sets surface->struct_size. The points belong to
  * `densepose` and live as long as it does.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has none), MAQ_ERROR_BAD_BUNDLE
- * (it is damaged). Blocks briefly the first time, while it is decoded. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the bundle has no surface),
+ * MAQ_ERROR_BAD_BUNDLE (the surface is damaged). Blocks briefly the first time, while the surface is decoded. */
 MAQ_API maq_status maq_densepose_get_surface(maq_densepose* densepose, maq_densepose_surface* surface);
 
 #ifdef __cplusplus

@@ -28,8 +28,9 @@ MAQ_API maq_status maq_densepose_model_set_roll(maq_model* model, float roll_rad
 
 /* Limits the mean time that dense pose takes for a frame of a stream, for devices that throttle. `budget_ms`: up to
  * 60000; 0 (at first): no limit. If frames take longer, people are detected in every 2nd and then every 4th frame.
- * After that, long_side_px falls in steps of 32 pixels, to no less than half. Both return step by step when there has
- * been time for some seconds. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+ * After that, long_side_px falls in steps of 32 pixels, to no less than half. When frames have taken less time for some
+ * seconds, both values return step by step.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_model_set_frame_budget(maq_model* model, double budget_ms);
 
 /* Gets the quality in use. The caller sets stats->struct_size.
@@ -39,7 +40,8 @@ MAQ_API maq_status maq_densepose_model_get_stats(const maq_model* model, maq_den
 /* Gets the surface that the bundle's labels refer to (maq_densepose_get_surface), once the model is loaded. The points
  * belong to `model` and live as long as it does.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the model is not loaded, or its bundle has no
- * surface), MAQ_ERROR_BAD_BUNDLE (it is damaged). Blocks briefly the first time, while it is decoded. */
+ * surface), MAQ_ERROR_BAD_BUNDLE (the surface is damaged). Blocks briefly the first time, while the surface is
+ * decoded. */
 MAQ_API maq_status maq_densepose_model_get_surface(maq_model* model, maq_densepose_surface* surface);
 
 /* Returns the people in the frame of a result, or NULL if another model ran. They belong to the result.

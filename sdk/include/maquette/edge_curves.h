@@ -25,8 +25,8 @@ typedef struct maq_edges_curves maq_edges_curves;
 typedef struct maq_edges_curves_config {
   uint32_t struct_size;
   float vote_radius_px;       /* pixels nearer than this to an edge vote for its position, up to 16; 0 (default): 4 */
-  float min_votes;            /* votes an edge needs, up to 100; 1 is the sum of all votes from one side of an edge;
-                                 0 (default): 0.35 */
+  float min_votes;            /* votes that an edge needs, up to 100; 1 is the sum of all votes from one side of an
+                                 edge; 0 (default): 0.35 */
   float flying_pixel_band_px; /* half-width of the band of mixed (flying) pixels along an edge, up to 32;
                                  0 (default): 3 */
   float fit_band_px;     /* width of the band beyond flying_pixel_band_px to which surfaces are fitted, 2 to 64. It is
@@ -114,9 +114,9 @@ typedef struct maq_edges_curves_stats {
   uint32_t struct_size;
   float curves_ms;
   float boxes_ms;
-  int32_t bad_pixel_count;     /* pixels whose distance or depth is not a number */
+  int32_t bad_pixel_count;     /* pixels with a distance or depth that is not a number */
   int32_t voting_pixel_count;  /* pixels near an edge */
-  int32_t chain_count;         /* candidates: chains of edge pixels. The rest counts the dropped ones. */
+  int32_t chain_count;         /* candidates: chains of edge pixels. The fields below count dropped candidates. */
   int32_t short_chain_count;   /* shorter than min_length_px */
   int32_t without_depth_count; /* no adjacent surface with known depth */
   int32_t not_fitted_count;    /* no type of curve fitted */
@@ -155,26 +155,27 @@ MAQ_API maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_edges_curves_get_stats(const maq_edges_curves* curves, maq_edges_curves_stats* stats);
 
-/* Finds the target at a position in the depth frame: the nearest corner within radius_px, or else the nearest curve
- * within radius_px, or else the adjacent plane on which the pixel's depth lies. The position need not be a whole pixel;
- * (0, 0) is the centre of the first. The caller sets snap->struct_size.
+/* Finds the target at a position in the depth frame. It is the nearest corner within radius_px, or else the nearest
+ * curve within radius_px. Otherwise it is the adjacent plane on which the pixel's depth lies. The position need not be
+ * a whole pixel; (0, 0) is the centre of the first. The caller sets snap->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (a radius that is not 0 to 1e6; curves of a fusion, which have no
  * pixels). Does not block. */
 MAQ_API maq_status maq_edges_curves_snap_to_pixel(const maq_edges_curves* curves, double x_px, double y_px,
                                                   double radius_px, maq_edges_snap* snap);
 
-/* Finds the target of a ray from `origin_m` along `direction` (any length but 0), in the coordinates of the curves: the
- * nearest corner within max_angle_rad, or else the nearest curve. Angles are seen from the origin. Otherwise it is the
- * first adjacent plane that the ray hits where the depth frame shows that plane. The caller sets snap->struct_size.
+/* Finds the target of a ray from `origin_m` along `direction` (any length but 0), in the coordinates of the curves. It
+ * is the nearest corner within max_angle_rad, or else the nearest curve. Angles are seen from the origin. Otherwise it
+ * is the first adjacent plane that the ray hits where the depth frame shows that plane. The caller sets
+ * snap->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (a direction of length 0, values that are not finite, an angle that is
  * not 0 to 1). Does not block. */
 MAQ_API maq_status maq_edges_curves_snap_to_ray(const maq_edges_curves* curves, const double origin_m[3],
                                                 const double direction[3], double max_angle_rad, maq_edges_snap* snap);
 
-/* Writes the curves to a file. The path's extension, in small letters, selects the format (docs/reference/formats.md):
- * .json (all data), .obj (lines), .ply (edges), .dxf (release 12) or .step (exact lines, circles and B-splines). The
- * file is written atomically and replaces an existing one. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another
- * extension), MAQ_ERROR_UNWRITABLE. Blocks while it writes. */
+/* Writes the curves to a file. The extension of `path`, in small letters, chooses the format
+ * (docs/reference/formats.md). It is .json (all data), .obj (lines), .ply (edges), .dxf (release 12), .step or .stp
+ * (exact lines, circles, splines). The file is written atomically and replaces an existing one.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE. Blocks while it writes. */
 MAQ_API maq_status maq_edges_curves_save(const maq_edges_curves* curves, const char* path);
 
 #ifdef __cplusplus

@@ -16,9 +16,9 @@
 extern "C" {
 #endif
 
-/* Lengths are in pixel footprints: r = depth / focal length. One r is the distance in metres between neighbouring
- * pixels on a surface that faces the camera at that depth. On such a surface, a point 1 r from an edge is about one
- * pixel from it. */
+/* Lengths are in pixel footprints: r = depth / focal length. At the depth of a pixel, one r is the distance in metres
+ * between neighbouring pixels on a surface that faces the camera. On this surface, a point 1 r from an edge is about
+ * one pixel away from the edge. */
 
 typedef struct maq_edges maq_edges;
 typedef struct maq_edges_result maq_edges_result;
@@ -28,8 +28,8 @@ typedef struct maq_edges_config {
   maq_model_options model;   /* default bundle: share/maquette/models/edges-int8; MAQ_THREADS_MEASURED measures with a
                                 frame of 320 x 240 */
   uint32_t result_pool_size; /* results the app may hold at once, 1 to 64; 0 (default): 4 */
-  int32_t skip_planes;    /* 1: run the network only on the part of the frame (half or all of each side) where depth is
-                             not flat within the sensor's noise. Elsewhere the distance is eps_r. This is faster and
+  int32_t skip_planes;    /* 1: run the network only where depth is not flat within the sensor's noise: on a part of the
+                             frame with half or all of each side. Elsewhere the distance is eps_r. This is faster and
                              may miss flat creases in noise. 0 (default): run on the whole frame. */
   int32_t average_frames; /* 2 to 64: average inverse depth over this number of frames, to reduce noise. The camera
                              must not move. Blocks of 32 x 32 px with motion, and pixels that jump, start a new average.
@@ -47,10 +47,9 @@ typedef enum maq_edges_plane {
 } maq_edges_plane;
 
 typedef enum maq_edges_kind {
-  MAQ_EDGES_KIND_NONE = 0,   /* no curve is nearer than eps_r, or depth is unknown */
-  MAQ_EDGES_KIND_CREASE = 1, /* two surfaces meet, and both are visible */
-  MAQ_EDGES_KIND_BOUNDARY =
-      2 /* the surface ends here and hides its other side; the visible surface behind is farther */
+  MAQ_EDGES_KIND_NONE = 0,    /* no curve is nearer than eps_r, or depth is unknown */
+  MAQ_EDGES_KIND_CREASE = 1,  /* two surfaces meet, and both are visible */
+  MAQ_EDGES_KIND_BOUNDARY = 2 /* the surface ends here; the visible surface behind it is farther away */
 } maq_edges_kind;
 
 typedef struct maq_edges_field {
@@ -76,7 +75,7 @@ typedef struct maq_edges_stats {
   maq_provider provider;        /* provider in use */
   int32_t threads;              /* threads of the network; fewer if the system starts no more (see the log) */
   int32_t is_threads_measured;  /* 1: MAQ_THREADS_MEASURED chose the number of threads */
-  int64_t averaged_pixel_count; /* pixels whose depth is the mean of several frames (average_frames) */
+  int64_t averaged_pixel_count; /* pixels with the mean depth of several frames (average_frames) */
 } maq_edges_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_edges_config) of the caller.
@@ -93,14 +92,14 @@ MAQ_API maq_status maq_edges_create(maq_context* context, const maq_edges_config
  * Once for each handle, from any thread. May block briefly. */
 MAQ_API void maq_edges_destroy(maq_edges* edges);
 
-/* Computes the distance field of a depth frame, or of the depth that came with a colour frame. The frame must carry
- * its intrinsics (maq_frame_desc): frames of a calibrated source do. Distortion is ignored. The frame is not kept. The
+/* Computes the distance field of a depth frame, or of the depth that came with a colour frame. The frame must carry its
+ * intrinsics (maq_frame_desc): frames of a calibrated source do. Distortion is ignored. The frame is not kept. The
  * first frame of a size prepares the network and takes longer. If no depth is known, the network does not run.
  * `*result` comes from a pool of result_pool_size: release it with maq_edges_result_release.
- * One at a time. Errors: MAQ_ERROR_UNSUPPORTED (a frame without depth or without intrinsics),
- * MAQ_ERROR_INVALID_ARGUMENT (intrinsics of another size, or with a focal length that is not positive),
- * MAQ_ERROR_IMAGE_SIZE (more than 8 million pixels), MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_BAD_BUNDLE (the graph does not fit
- * its manifest), MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks while the network runs. */
+ * One at a time. Errors: MAQ_ERROR_UNSUPPORTED (a frame without depth or without intrinsics).
+ * MAQ_ERROR_INVALID_ARGUMENT (intrinsics of another size, or with a focal length that is not positive).
+ * MAQ_ERROR_IMAGE_SIZE (more than 8 million pixels). MAQ_ERROR_BAD_BUNDLE (the graph does not fit its manifest).
+ * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_INFERENCE, MAQ_CANCELLED. Blocks while the network runs. */
 MAQ_API maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, maq_edges_result** result);
 
 /* Cancels the running maq_edges_run, or else the next one. It returns MAQ_CANCELLED after the current layer of the
@@ -116,8 +115,9 @@ MAQ_API void maq_edges_result_release(maq_edges_result* result);
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_edges_result_get_field(const maq_edges_result* result, maq_edges_field* field);
 
-/* Gets a plane inside the result: height_px rows of `*stride_bytes` bytes. maq_edges_plane gives the type of its
- * values. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
+/* Gets a plane: height_px rows of `*stride_bytes` bytes. The values are inside the result and valid until it is
+ * released. maq_edges_plane gives their type.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_edges_result_get_plane(const maq_edges_result* result, maq_edges_plane plane,
                                               const void** values, size_t* stride_bytes);
 
@@ -130,7 +130,7 @@ MAQ_API maq_status maq_edges_result_copy_distance_m(const maq_edges_result* resu
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_stats* stats);
 
-/* Writes three files whose names begin with `path`, in a folder that exists (docs/reference/formats.md):
+/* Writes three files that begin with `path`, in a folder that exists (docs/reference/formats.md):
  *   <path>_distance.png   16 bits: thousandths of r
  *   <path>_kind.png       8 bits: maq_edges_kind
  *   <path>_edges.json     size, eps_r, intrinsics

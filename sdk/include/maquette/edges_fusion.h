@@ -72,9 +72,9 @@ MAQ_API maq_status maq_edges_fusion_create(maq_context* context, const maq_edges
  * Once for each fusion, from any thread. Does not block. */
 MAQ_API void maq_edges_fusion_destroy(maq_edges_fusion* fusion);
 
-/* Adds the field of a view and finds its curves. `camera` gives the pose. Its intrinsics may be all 0: those of the
- * result are used. Otherwise they must have the result's size; distortion is ignored. Neither argument is kept. The
- * order of views does not matter. A view without known depth is counted and changes nothing. On failure the fusion
+/* Adds the field of a view and finds its curves. `camera` gives the pose. If its intrinsics are all 0, the intrinsics
+ * of the result are used. Otherwise they must have the result's size; distortion is ignored. Neither argument is kept.
+ * The order of views does not matter. A view without known depth is counted and changes nothing. On failure the fusion
  * stays unchanged.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (a camera of another size, an invalid rotation, another eps_r),
  * MAQ_ERROR_UNSUPPORTED (more than max_pixels). Blocks for some milliseconds. */

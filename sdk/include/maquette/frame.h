@@ -145,8 +145,8 @@ typedef struct maq_frame_origin {
 MAQ_API maq_status maq_frame_get_origin(const maq_frame* frame, maq_frame_origin* origin);
 
 /* Describes the frame's depth image, with intrinsics for its size. For a depth frame these are its own pixels. For a
- * colour frame it is the aligned MAQ_PIXEL_DEPTH16 image that came with it, which may be smaller and shows the same
- * view. The planes are valid until the frame is released. The caller sets desc->struct_size.
+ * colour frame it is the aligned MAQ_PIXEL_DEPTH16 image of the same view, which may be smaller. The planes are valid
+ * until the frame is released. The caller sets desc->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the frame has no depth). Does not block. */
 MAQ_API maq_status maq_frame_get_depth(const maq_frame* frame, maq_frame_desc* desc);
 
@@ -171,7 +171,7 @@ MAQ_API maq_status maq_frame_copy_pixels(const maq_frame* frame, maq_pixel_forma
  * block. */
 MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, int32_t height_px, maq_frame** resized);
 
-/* Writes the frame to an image file, whose format is given by the path's extension. The file is written atomically and
+/* Writes the frame to an image file. The extension of `path` chooses the format. The file is written atomically and
  * replaces an existing one. Its folder must exist. A predicted frame is marked in the file, and reading restores the
  * mark.
  *   colour: .png (lossless), or .jpg and .jpeg at quality 95; grey stays grey, others become RGB without alpha

@@ -9,7 +9,7 @@
  *
  * A face is biometric data: ask the person, and protect heads like passwords. Nothing leaves the device. A builder
  * keeps the part of each photo around the head until maq_head_builder_clear or maq_head_builder_destroy. A head and its
- * file hold no photo, unless the builder's config asks for a texture, which has the face's pixels.
+ * file hold no photo, unless the builder's config asks for a texture. A texture has the pixels of the face.
  */
 #ifndef MAQUETTE_HEAD_H_
 #define MAQUETTE_HEAD_H_
@@ -21,7 +21,9 @@
 extern "C" {
 #endif
 
-/* The head's frame: metres, x to the person's left, y to the back of the head, z up, the origin in its middle. */
+/* The head's frame: metres, x to the person's left, y to the back, z up. Its origin is the middle of the head. The
+ * template head is the SDK's standard head. Each of its points, such as the tip of the nose, has a corresponding point
+ * on every head. A network, the encoder, estimates which template point each part of a photo shows. */
 
 typedef struct maq_head_builder maq_head_builder;
 typedef struct maq_head maq_head;
@@ -33,8 +35,8 @@ typedef struct maq_head_renderer maq_head_renderer;
 /* Whether heads get a texture. Values never change meaning; new ones are added at the end. */
 typedef enum maq_head_texture {
   MAQ_HEAD_TEXTURE_DEFAULT = 0, /* the SDK's choice: MAQ_HEAD_TEXTURE_OFF in this version */
-  MAQ_HEAD_TEXTURE_OFF = 1,     /* heads have colours of the network alone, and hold no part of a photo */
-  MAQ_HEAD_TEXTURE_ON = 2 /* the photos' pixels where they see the surface well, the network's colours elsewhere */
+  MAQ_HEAD_TEXTURE_OFF = 1,     /* heads have only the network's colours, and hold no part of a photo */
+  MAQ_HEAD_TEXTURE_ON = 2 /* the photos' pixels where a photo shows the surface well, the network's colours elsewhere */
 } maq_head_texture;
 
 /* All zero is the default. */
@@ -42,12 +44,12 @@ typedef struct maq_head_builder_config {
   uint32_t struct_size;
   maq_model_options model;  /* the encoder network; model.threads also counts for the fit. The bundle has the task
                                "heads"; the installed one is share/maquette/models/heads-int8. */
-  maq_head_texture texture; /* with 1024 pixels a fit takes 140 MB of memory more, and a second or two */
+  maq_head_texture texture; /* a texture of 1024 pixels a side takes 140 MB of memory and one to two seconds more */
   uint32_t texture_px;      /* pixels a side of the texture, 256 to 2048; 0: 1024. Only with MAQ_HEAD_TEXTURE_ON. */
   int32_t mirror_unseen;    /* 1: if no photo sees one side of the head, the texture of the other side is mirrored.
                                0: that side has the network's colours. */
-  int32_t delight_texture; /* 1: directional light of the photos is removed from the texture, as far as the colours tell
-                              it, so that an app can relight the head. 0: it stays. */
+  int32_t delight_texture;  /* 1: directional light of the photos is removed from the texture, as far as it can be
+                               estimated. An app can then relight the head. 0: it stays. */
   maq_progress_callback progress_callback; /* of maq_head_builder_fit; may be NULL */
   void* progress_user_data;                /* passed to progress_callback */
 } maq_head_builder_config;
@@ -58,34 +60,35 @@ typedef struct maq_head_photo {
   float box_px[4]; /* of the head with its hair: left, top, right, bottom; right and bottom are exclusive. The box may
                       reach beyond the photo. All 0: the head is detected; slower, and reliable only for one large head
                       per photo. */
-  float roll_rad;  /* rotation of the head in the photo's plane, clockwise from upright, -7 to 7; exact to some 30
-                      degrees is enough */
-  float focal_px;  /* focal length in pixels of this photo, 0.001 to 1e9. 0: unknown, and estimated jointly with the
+  float roll_rad;  /* rotation of the head in the photo's plane, clockwise from upright, -7 to 7; a value
+                      within some 30 degrees is enough */
+  float focal_px;  /* focal length in pixels of this photo, 0.001 to 1e9. 0: unknown; estimated together with the
                       head */
 } maq_head_photo;
 
 /* The result for one photo. */
 typedef struct maq_head_photo_info {
   uint32_t struct_size;
-  float box_px[4];     /* of the head: given, or detected */
+  float box_px[4];     /* box of the head: given, or detected */
   float head_coverage; /* fraction of the encoder's crop that shows the head, 0 to 1 */
   /* The other fields describe the latest maq_head_builder_fit, and are 0 before. */
   int32_t is_used; /* 1: the head was fitted to the photo. 0: rejected: no head, or a different person. */
   float focal_px;  /* focal length, given or estimated; 0 if the photo was not used */
-  float rms_px;    /* root mean square distance of head points from where the network saw them; 0 if not used */
+  float rms_px;    /* root mean square distance between projected head points and the network's estimates; 0 if the
+                      photo was not used */
 } maq_head_photo_info;
 
-/* Times in wall-clock milliseconds, and counts, of the photos so far and of the latest fit. */
+/* Wall-clock times in milliseconds, and counts, for the photos so far and for the latest fit. */
 typedef struct maq_head_build_stats {
   uint32_t struct_size;
   uint32_t photo_count;
   uint32_t used_photo_count; /* photos that the head was fitted to */
   float encode_ms;           /* the network, in maq_head_builder_add_photo, over all photos */
-  float pose_ms;             /* cameras and a first shape, from the network's output */
-  float fit_ms;              /* the fit of the head to the pixels */
-  float total_ms;            /* of maq_head_builder_fit */
-  int32_t step_count;        /* of the fit to the pixels */
-  maq_provider provider;     /* in use for the network */
+  float pose_ms;             /* first stage of the fit: cameras and a first shape */
+  float fit_ms;              /* second stage: the fit to the pixels */
+  float total_ms;            /* total of maq_head_builder_fit */
+  int32_t step_count;        /* steps of the fit to the pixels */
+  maq_provider provider;     /* provider in use for the network */
   int32_t threads;
 } maq_head_build_stats;
 
@@ -108,9 +111,10 @@ MAQ_API maq_status maq_head_builder_create(maq_context* context, const maq_head_
  * Once for each builder, from any thread. Does not block. */
 MAQ_API void maq_head_builder_destroy(maq_head_builder* builder);
 
-/* Encodes a photo of the head: a colour or grey image of any format, without lens distortion. Several photos must show
- * one person; each may have its own camera. `photo` may be NULL for the defaults. The index of the photo is the number
- * of photos before it. The frame is not kept; its part around the head is. On failure the builder stays as it was.
+/* Runs the encoder on a photo of the head: a colour or grey image of any format, without lens distortion. Several
+ * photos must show one person; each may have its own camera. `photo` may be NULL for the defaults. The index of the
+ * photo is the number of photos before it. The frame is not kept; its part around the head is. On failure the builder
+ * stays as it was.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (a box that is empty, not finite or outside of the photo; a focal
  * length that is not positive; more than 64 photos). MAQ_ERROR_NOT_FOUND (no head). MAQ_ERROR_UNSUPPORTED (a depth
  * image). MAQ_ERROR_BAD_BUNDLE (the graph contradicts the manifest). MAQ_ERROR_INFERENCE. MAQ_CANCELLED. Blocks while
@@ -118,24 +122,24 @@ MAQ_API void maq_head_builder_destroy(maq_head_builder* builder);
 MAQ_API maq_status maq_head_builder_add_photo(maq_head_builder* builder, const maq_frame* frame,
                                               const maq_head_photo* photo);
 
-/* Uses `head` as prior for later fits, so that its photos are not needed again. `head` must show the same person and
- * come from the same bundle. A builder has one prior head: another call replaces it. A fitted head then has the cameras
- * of `head` first, unchanged, and a known size stays. Colours depend more on this builder's photos. If the config asks
- * for a texture, the texture of `head` fills what these photos do not show. `head` is not kept.
+/* Uses `head` as prior for later fits, which do not need its photos again. `head` must show the same person and come
+ * from the same bundle. A builder has one prior head: another call replaces it. In a head that is fitted afterwards,
+ * the cameras of `head` come first, unchanged. A known size stays. Colours depend more on this builder's photos. If the
+ * config asks for a texture, the texture of `head` fills the parts that these photos do not show. `head` is not kept.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (it has more than 192 photos), MAQ_ERROR_UNSUPPORTED (another
  * bundle, or a file of version 1). Blocks for some milliseconds. */
 MAQ_API maq_status maq_head_builder_add_head(maq_head_builder* builder, const maq_head* head);
 
-/* Forgets the photos and the prior head, so that another person's head can be fitted.
+/* Forgets the photos and the prior head. Another person's head can be fitted afterwards.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_builder_clear(maq_head_builder* builder);
 
 /* Fits one head to the photos so far. The first stage finds cameras and a shape from the network's output, in
- * milliseconds; with `seconds` 0 that is the result. The second stage fits shape and colours to the pixels, for up to
+ * milliseconds; with `seconds` 0 this is the result. The second stage fits shape and colours to the pixels, for up to
  * `seconds` (0 to 3600) or until it converges. Some 3 seconds are enough on a laptop. Parts that no photo shows follow
- * from similar heads. Photos that show no head or a different person are rejected, if one photo is left
- * (maq_head_photo_info). More photos may be added afterwards and all be fitted again. The result is the same for the
- * same photos, steps, threads and processor. The caller owns `*head`; give it to maq_head_destroy.
+ * from similar heads. Photos that show no head or a different person are rejected, as long as one photo is left
+ * (maq_head_photo_info). More photos may be added later, for another fit to all photos. Equal photos, number of steps,
+ * threads and processor give equal results. The caller owns `*head`; give it to maq_head_destroy.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (no photos), MAQ_ERROR_NOT_FOUND (no photo shows a head),
  * MAQ_CANCELLED. Blocks until the head is fitted. */
 MAQ_API maq_status maq_head_builder_fit(maq_head_builder* builder, double seconds, maq_head** head);
@@ -149,18 +153,18 @@ MAQ_API maq_status maq_head_builder_cancel(maq_head_builder* builder);
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_builder_get_stats(const maq_head_builder* builder, maq_head_build_stats* stats);
 
-/* Gets what was found in the photo at `index`. The caller sets info->struct_size.
+/* Gets the result for the photo at `index`. The caller sets info->struct_size.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_head_builder_get_photo(const maq_head_builder* builder, uint32_t index,
                                               maq_head_photo_info* info);
 
-/* Receives the head as far as it is fitted, on the thread of maq_head_builder_fit. The fit waits, so the callback's
- * time is part of the fit's time. The callback owns `head`; it gives it to maq_head_destroy. It must not use the
- * builder, except for maq_head_builder_cancel, and must not throw. */
+/* Receives the head in its current state, on the thread of maq_head_builder_fit. The fit waits: the callback's time is
+ * part of the fit's time. The callback owns `head` and gives it to maq_head_destroy. It must not use the builder,
+ * except for maq_head_builder_cancel, and must not throw. */
 typedef void (*maq_head_preview_callback)(void* user_data, maq_head* head);
 
-/* Has later fits call `preview`: first with the network's head, then every `interval_s` seconds (0 to 3600). Fits with
- * `seconds` 0 have no preview. NULL ends previews. `user_data` is passed to `preview`.
+/* Sets a callback for later fits. They call `preview` first with the network's head, then every `interval_s` seconds (0
+ * to 3600). Fits with `seconds` 0 have no preview. NULL ends previews. `user_data` is passed to `preview`.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interval_s,
                                                 maq_head_preview_callback preview, void* user_data);
@@ -169,7 +173,7 @@ MAQ_API maq_status maq_head_builder_set_preview(maq_head_builder* builder, doubl
 
 /* Where the size of a head comes from. */
 typedef enum maq_head_scale {
-  MAQ_HEAD_SCALE_PRIOR = 0, /* the average of heads: photos alone do not tell the size */
+  MAQ_HEAD_SCALE_PRIOR = 0, /* the mean size of similar heads: photos alone do not tell the size */
   MAQ_HEAD_SCALE_GIVEN = 1, /* a known distance (maq_head_scale_by_distance) */
   MAQ_HEAD_SCALE_DEPTH = 2  /* a depth camera (maq_head_scale_by_depth) */
 } maq_head_scale;
@@ -186,8 +190,8 @@ typedef struct maq_head_info {
 /* A named point of the head. */
 typedef struct maq_head_landmark {
   uint32_t struct_size;
-  float sigma_m; /* standard deviation of each coordinate, by shape model and photos. It is larger where no photo shows
-                    the point, and along the lines of sight. The deviation of the size comes on top. */
+  float sigma_m; /* standard deviation of each coordinate, from shape model and photos. It is larger where no photo
+                    shows the point, and along the lines of sight. scale_sigma of maq_head_info comes on top. */
   double point_m[3];
 } maq_head_landmark;
 
@@ -222,24 +226,24 @@ MAQ_API const char* maq_head_get_landmark_name(const maq_head* head, uint32_t in
 MAQ_API maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_head_landmark* landmark);
 
 /* Gets the camera of a photo that the head was fitted to. `index` is below photo_count of maq_head_info. An image that
- * is rendered with this camera lies on the head in the photo. The caller sets camera->struct_size.
+ * is rendered with this camera matches the head in the photo. The caller sets camera->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_head_get_camera(const maq_head* head, uint32_t index, maq_pinhole_camera* camera);
 
-/* Copies the head with another size: the landmarks `from` and `to` are then `distance_m` (0.001 to 10) apart. An
- * example is the distance of pupil_left and pupil_right that an optician measured. The copy has MAQ_HEAD_SCALE_GIVEN;
- * its scale_sigma is the model's uncertainty of these landmarks. The caller owns `*scaled`; give it to
- * maq_head_destroy. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: both are the same point), MAQ_ERROR_NOT_FOUND
- * (the model has no such landmark). Does not block. */
+/* Copies the head and scales it: the landmarks `from` and `to` are then `distance_m` (0.001 to 10) apart. An example is
+ * the distance of pupil_left and pupil_right that an optician measured. The copy has MAQ_HEAD_SCALE_GIVEN; its
+ * scale_sigma is the model's uncertainty of these landmarks. The caller owns `*scaled`; give it to maq_head_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: both are the same point), MAQ_ERROR_NOT_FOUND (the model has no
+ * such landmark). Does not block. */
 MAQ_API maq_status maq_head_scale_by_distance(const maq_head* head, const char* from, const char* to, double distance_m,
                                               maq_head** scaled);
 
-/* Copies the head with the size at which it fits a depth image. `frame` is a depth image, or an image with depth, of
- * the view of the photo with the camera at `index` (maq_head_get_camera), in any size. Give that photo its focal_px: an
+/* Copies the head and scales it to fit a depth image. `frame` is a depth image, or an image with depth, in any size. It
+ * shows the view of the photo with the camera at `index` (maq_head_get_camera). Give this photo its focal_px: an
  * estimate that is 10 % too long makes the head 10 % too small. The copy has MAQ_HEAD_SCALE_DEPTH; its scale_sigma is
  * the spread of the pixels' depth. The caller owns `*scaled`; give it to maq_head_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range, no depth, another aspect ratio than the photo's).
- * MAQ_ERROR_NOT_FOUND (half of the head has no depth that agrees with it). MAQ_ERROR_OUT_OF_MEMORY. Blocks for some 100
+ * MAQ_ERROR_NOT_FOUND (less than half of the head has matching depth). MAQ_ERROR_OUT_OF_MEMORY. Blocks for some 100
  * ms. */
 MAQ_API maq_status maq_head_scale_by_depth(const maq_head* head, uint32_t index, const maq_frame* frame,
                                            maq_head** scaled);
@@ -260,14 +264,14 @@ typedef enum maq_head_topology {
 /* All zero is the default. */
 typedef struct maq_head_mesh_config {
   uint32_t struct_size;
-  maq_model_options model; /* threads: 0 means the threads of the builder that fitted the head. The bundle is read for
-                              MAQ_HEAD_TOPOLOGY_TEMPLATE of a head from a file, which has no template in it; the
-                              installed one is share/maquette/models/heads-int8. Other fields have no effect. */
-  maq_head_topology topology; /* with the template's, triangle_count and cell_m must be 0 */
-  uint32_t triangle_count;    /* about this many triangles are left, 100 or more; edges are collapsed in the order of
-                                 least change. 0: 60,000, or all if cell_m is set; MAQ_HEAD_ALL_TRIANGLES: all */
-  double cell_m; /* distance between neighbouring vertices before that, about, 0.0005 to 0.02. 0: 0.0021, or
-                    0.0016 for more than 60,000 triangles */
+  maq_model_options model;    /* threads: 0 means the threads of the builder that fitted the head. A bundle is read only
+                                 for the template topology of a head from a file, because the file has no template. The
+                                 installed one is share/maquette/models/heads-int8. Other fields have no effect. */
+  maq_head_topology topology; /* with MAQ_HEAD_TOPOLOGY_TEMPLATE, triangle_count and cell_m must be 0 */
+  uint32_t triangle_count;    /* approximate number of triangles, 100 or more; edges are collapsed in the order of least
+                                 change. 0: 60,000, or all if cell_m is set; MAQ_HEAD_ALL_TRIANGLES: all */
+  double cell_m; /* approximate distance between neighbouring vertices before edges are collapsed, 0.0005 to 0.02.
+                    0: 0.0021, or 0.0016 for more than 60,000 triangles */
 } maq_head_mesh_config;
 
 /* The arrays of a mesh. With MAQ_HEAD_TOPOLOGY_FIELD it is closed, without holes, and ends at a plane below the chin.
@@ -289,8 +293,8 @@ typedef struct maq_head_mesh_data {
   const uint8_t* texture_jpeg;  /* a square JPEG file: a disc, the crown in its middle, the face in its lower half; NULL
                                    if the head has no texture, and with MAQ_HEAD_TOPOLOGY_TEMPLATE */
   uint32_t texture_bytes;       /* size of texture_jpeg */
-  float simplification_error_m; /* largest distance of a vertex of the full mesh from this one; 0 if nothing was removed
-                                 */
+  float simplification_error_m; /* largest distance between a vertex of the full mesh and this mesh; 0 if nothing was
+                                   removed */
 } maq_head_mesh_data;
 
 /* A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The deltas of
@@ -307,11 +311,11 @@ typedef struct maq_head_morph_target {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_mesh_config_init(maq_head_mesh_config* config, uint32_t struct_size);
 
-/* Makes a mesh of the head's surface. `config` may be NULL for the defaults. The mesh does not need the head
- * afterwards. The caller owns `*mesh`; give it to maq_head_mesh_destroy. Any thread. Errors:
- * MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the head has no surface, or the bundle no template),
- * MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the template's bundle), MAQ_ERROR_OUT_OF_MEMORY. Blocks while the mesh
- * is made, a second or less with the defaults. */
+/* Creates a mesh of the head's surface. `config` may be NULL for the defaults. The mesh does not need the head
+ * afterwards. The caller owns `*mesh`; give it to maq_head_mesh_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the head has no surface, or the bundle no
+ * template), MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the template's bundle), MAQ_ERROR_OUT_OF_MEMORY. Blocks
+ * while the mesh is computed, a second or less with the defaults. */
 MAQ_API maq_status maq_head_mesh_create(const maq_head* head, const maq_head_mesh_config* config, maq_head_mesh** mesh);
 
 /* Frees the mesh (NULL is fine); its arrays are invalid afterwards. Renderers stay valid.
@@ -327,11 +331,12 @@ MAQ_API maq_status maq_head_mesh_get_data(const maq_head_mesh* mesh, maq_head_me
 MAQ_API maq_status maq_head_mesh_get_morph_target(const maq_head_mesh* mesh, uint32_t index,
                                                   maq_head_morph_target* target);
 
-/* Writes the mesh to a file. The extension of `path` chooses the format: .glb (glTF 2.0), .obj with a .mtl beside it,
- * or .ply (binary, with template points). GLB and OBJ have the texture, GLB also the morph targets. In files x is to
- * the person's left, y up and z to the front, as in glTF (docs/reference). Files appear atomically and replace existing
- * ones. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE. Blocks while the
- * files are written. */
+/* Writes the mesh to a file. The extension of `path`, in small letters, chooses the format: .glb (glTF 2.0), .obj with
+ * a .mtl file, or .ply (binary, with template points). GLB and OBJ have the texture; GLB also has the morph targets. In
+ * files, x points to the person's left, y up and z to the front, as in glTF (docs/reference/formats.md). Files appear
+ * atomically and replace existing ones.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE. Blocks while the files are
+ * written. */
 MAQ_API maq_status maq_head_mesh_save(const maq_head_mesh* mesh, const char* path);
 
 /* ---- Rendering ----
@@ -342,7 +347,7 @@ MAQ_API maq_status maq_head_mesh_save(const maq_head_mesh* mesh, const char* pat
  *   maq_image_save(image, "head.png", MAQ_IMAGE_ALPHA_ON);
  */
 
-/* The meaning of the colours of an image. */
+/* The meaning of the colours of an image (MAQ_IMAGE_PLANE_BGR). */
 typedef enum maq_head_shading {
   MAQ_HEAD_SHADING_COLOUR = 0,   /* the mesh's texture, or its colours if it has none; in soft light */
   MAQ_HEAD_SHADING_SHAPE = 1,    /* grey, in soft light */
@@ -360,8 +365,8 @@ typedef struct maq_head_renderer_config {
   int32_t threads; /* 1 to 64; 0: the machine's large cores, at most 4 */
   double near_m;   /* points nearer to the camera along its axis are not drawn, 1e-6 to 1e6. 0: 0.01 */
   maq_head_shading shading;
-  float shading_strength;       /* how much darker surfaces are that face away from the light, up to 1 (black). 0: 0.35;
-                                   MAQ_HEAD_SHADING_STRENGTH_OFF: not at all */
+  float shading_strength;       /* darkening of surfaces that face away from the light, up to 1 (black). 0: 0.35;
+                                   MAQ_HEAD_SHADING_STRENGTH_OFF: none */
   int32_t disable_antialiasing; /* 1: one sample a pixel, which is faster; 0: four samples */
   int32_t use_background;       /* 1: images are composed over `background` by their alpha; 0: colours are 0 where no
                                    head is */
@@ -373,9 +378,8 @@ typedef struct maq_head_renderer_config {
  * caller. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_renderer_config_init(maq_head_renderer_config* config, uint32_t struct_size);
 
-/* Creates a renderer of a mesh, which it does not need afterwards. `config` may be NULL for the defaults. The caller
- * owns
- * `*renderer`; give it to maq_head_renderer_destroy.
+/* Creates a renderer of a mesh. The renderer does not need the mesh afterwards. `config` may be NULL for the defaults.
+ * The caller owns `*renderer`; give it to maq_head_renderer_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_OUT_OF_MEMORY. Blocks while a texture is decoded. */
 MAQ_API maq_status maq_head_renderer_create(maq_context* context, const maq_head_renderer_config* config,
                                             const maq_head_mesh* mesh, maq_head_renderer** renderer);
@@ -384,11 +388,11 @@ MAQ_API maq_status maq_head_renderer_create(maq_context* context, const maq_head
  * Once for each renderer, from any thread, while it does not render. Does not block. */
 MAQ_API void maq_head_renderer_destroy(maq_head_renderer* renderer);
 
-/* Fills `camera` with a camera that sees the whole head, for an image of width_px x height_px. `yaw_rad` turns it to
- * the person's left of the front, `pitch_rad` above. The distance is the same for all angles. The caller sets
- * camera->struct_size.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (an angle that is not finite), MAQ_ERROR_IMAGE_SIZE. Does not block.
- */
+/* Fills `camera` with a camera that sees the whole head, for an image of width_px x height_px. From the front, the
+ * camera moves by `yaw_rad` around the head to the person's left, and by `pitch_rad` upwards. The distance is the same
+ * for all angles. The caller sets camera->struct_size.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (an angle that is not finite), MAQ_ERROR_IMAGE_SIZE. Does not
+ * block. */
 MAQ_API maq_status maq_head_renderer_get_camera(const maq_head_renderer* renderer, double yaw_rad, double pitch_rad,
                                                 int32_t width_px, int32_t height_px, maq_pinhole_camera* camera);
 
@@ -396,9 +400,11 @@ MAQ_API maq_status maq_head_renderer_get_camera(const maq_head_renderer* rendere
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_head_renderer_set_shading(maq_head_renderer* renderer, maq_head_shading shading);
 
-/* Renders the view of a camera, in the camera's size. The world is the head's frame, in metres. The camera should be
- * outside of the head, which has no inside. `*image` comes from a pool of image_pool_size: give it back with
- * maq_image_release. It has all planes.
+/* Renders the head as `camera` sees it, in the camera's size, with the shading of the config or of the latest
+ * maq_head_renderer_set_shading. The world is the head's frame, in metres. The caller sets camera->struct_size;
+ * maq_head_renderer_get_camera and maq_head_get_camera fill the rest. The camera should be outside of the head:
+ * surfaces that face away from it are not drawn. `*image` comes from a pool of image_pool_size: give it back with
+ * maq_image_release. It has all planes of maq_image_plane.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, or one with distortion), MAQ_ERROR_IMAGE_SIZE,
  * MAQ_ERROR_POOL_EMPTY, MAQ_ERROR_OUT_OF_MEMORY. Blocks while it renders, some milliseconds. */
 MAQ_API maq_status maq_head_renderer_run(maq_head_renderer* renderer, const maq_pinhole_camera* camera,

@@ -28,8 +28,8 @@ typedef enum maq_image_plane {
                                   scene for scenes; 0 where nothing is */
   MAQ_IMAGE_PLANE_NORMALS = 4, /* heads only. Three floats a pixel: the outward normal in the camera (x right, y down,
                                   z forward), of length 1; 0 where no head is. */
-  MAQ_IMAGE_PLANE_TEMPLATE_POINTS = 5 /* heads only. Three floats a pixel: the point of the template head, in metres;
-                                         0 where no head is. */
+  MAQ_IMAGE_PLANE_TEMPLATE_POINTS = 5 /* heads only. Three floats a pixel: the corresponding point of the template
+                                         head, in metres; 0 where no head is. */
 } maq_image_plane;
 
 /* Whether a file gets the alpha plane. */

@@ -11,13 +11,14 @@
  *
  *   maq_X_config_init   fills a config with the defaults
  *   maq_X_create        makes the object, loads its networks
- *   run, push           takes a frame and returns a result, an object of its own
- *   _get_stats          returns times and counts of the result
+ *   _run                takes a frame and returns a result object
+ *   _push               adds the next frame of a stream
+ *   _get_stats          returns times and counts
  *   _save(path)         writes the result to a file
  *   _release, _destroy  give results and objects back
  *
- *   _cancel(object) ends a running call, or else the next one. It may come from any thread. The call returns
- *   MAQ_CANCELLED. A progress callback cancels by returning 0.
+ *   _cancel(object) ends the running call on the object, or else the next one. Any thread may call it. The ended call
+ *   returns MAQ_CANCELLED. A progress callback cancels by returning 0.
  *
  * Names.
  *
@@ -25,7 +26,7 @@
  *   number, `_get_<thing>(…, index, &thing)` returns one item.
  * - Types and enum values begin with the name of their system. The bounds of a range are min and max.
  * - Units are in the names: _px, _ms, _ns, _m, _bytes. Texts are UTF-8 and end with a zero byte.
- * - A parameter `count` after an array is the capacity of that array, in elements.
+ * - A parameter `count` or `capacity` after an array is the capacity of that array, in elements.
  *
  * Ownership.
  *
@@ -33,7 +34,7 @@
  *   object, in any order. NULL is fine.
  *
  *     _create, _open, _open_memory, _build,   _destroy   contexts, sources, lists, models, builders, captures, scenes,
- *     _fit, _scale_…, _finish                            heads, meshes, renderers, writers
+ *     _fit, _scale_…, _finish                            heads, meshes, renderers, clips, recorders
  *     _acquire_…, _run, _find_…, _load_…,     _release   frames, results and images, most from a pool of fixed size
  *     _wrap, _decode, _resize, _convert_yuv,
  *     _predict
@@ -48,14 +49,14 @@
  *   struct, or use the `_init` function. Headers and library of the same minor version agree on all sizes.
  * - 0 means "default" in every field of a config. "Off" is an enum value. Yes or no is an int32_t, 1 or 0; its
  *   default is 0, no. A NULL config means the defaults. Configs are copied.
- * - `model` (maq_model_options) is the first member of each config whose system has networks.
+ * - Each config of a system with networks begins with struct_size and `model` (maq_model_options).
  *
  * Errors.
  *
- * - Each call that can fail returns maq_status. It writes its result through its last argument only when it returns
- *   MAQ_OK. maq_last_error(NULL) returns a sentence: what was wrong, and what to do.
- * - No C++ exception leaves the library, and the library never ends the process. The signals of a full disk
- *   (SIGXFSZ) and of a pipe without a reader (SIGPIPE) do not end it either while the library writes. Exceptions of
+ * - Each call that can fail returns maq_status. It writes results through its pointer arguments only when it
+ *   returns MAQ_OK. maq_last_error(NULL) returns a sentence with the cause and the remedy.
+ * - No C++ exception leaves the library, and the library never ends the process. While the library writes, the
+ *   signals of a full disk (SIGXFSZ) and of a pipe without a reader (SIGPIPE) do not end it either. Exceptions of
  *   callbacks are caught.
  * - If the system starts fewer threads than requested (ulimit -u, limits of containers), networks and renderers use
  *   the threads they get, and the log has a warning. Live sources and pipelines need one thread. Without it they
@@ -66,10 +67,10 @@
  *   cannot detect these cases, and the behaviour is undefined:
  *
  *     - a pointer that is not from this library; an array or a buffer that is shorter than stated;
- *     - an object that was given back so long ago that its memory is used again: an object of a pool after the pool
- *       has lent it again or is gone; another object after 64 more were given back;
- *     - giving back an object while another thread uses it in an "any thread" call or as an argument, unless the
- *       function's comment allows it;
+ *     - use of an object long after it was given back. For an object of a pool: after the pool has lent it again or is
+ *       gone. For any other object: after 64 more objects were given back;
+ *     - giving back an object while another thread uses it, in an "any thread" call or as an argument. Some functions
+ *       allow it in their comment;
  *     - memory of the app that changes while a call, or a frame made by maq_frame_wrap, reads it;
  *     - a callback that does not return (longjmp, the end of its thread).
  *

@@ -8,15 +8,15 @@
 extern "C" {
 #endif
 
-/* A novelty stream scores each frame by its surprisal after the frames before, in bits. It finds cuts, frozen or
- * covered cameras, and objects that appear, without a list of events. A network encodes the frame as codes of a map of
- * cells. A second network (or the bigram prior) and the stream's own past say how likely each code is.
+/* A novelty stream scores each frame by its surprisal in bits: the less likely the frame is after the frames before,
+ * the more bits. It finds cuts, frozen or covered cameras, and objects that appear, without a list of events. A network
+ * divides the frame into cells and describes each cell by codes, which are entries of a codebook. A second network (or
+ * the bigram prior) and the stream's own past say how likely each code is.
  *
  *   maq_novelty_create(context, NULL, &novelty);
  *   score.struct_size = sizeof score;
  *   maq_novelty_push(novelty, frame, &score);   // each frame of the stream
- *   if (score.is_event) { ... }
- */
+ *   if (score.is_event) { ... } */
 typedef struct maq_novelty maq_novelty;
 
 /* The source of code probabilities. Values never change meaning; new ones are added at the end. */
@@ -32,9 +32,9 @@ typedef struct maq_novelty_config {
   maq_novelty_method method; /* default MAQ_NOVELTY_AUTO */
   float event_ratio;         /* a frame is an event from this ratio up, and from 1 / event_ratio down: above 1, at
                                 most 1e6; 0 (default): 4 */
-  const maq_novelty* shared_with; /* shares the networks of this stream; `model` is then not read. Both encode frames in
-                                     turn. AUTO uses the other's transformer, if it has one. The other may be destroyed
-                                     first. Default NULL: own networks */
+  const maq_novelty* shared_with; /* shares the networks of this stream; `model` is then not read. The two streams
+                                     encode frames one after the other. AUTO uses the transformer of this stream, if it
+                                     has one. Either may be destroyed first. Default NULL: own networks */
 } maq_novelty_config;
 
 /* The score of one frame. */
@@ -86,16 +86,17 @@ MAQ_API void maq_novelty_destroy(maq_novelty* novelty);
  * while the networks run, also for streams that share them. */
 MAQ_API maq_status maq_novelty_push(maq_novelty* novelty, const maq_frame* frame, maq_novelty_score* score);
 
-/* Writes the map of the latest frame: per cell, the mean bits of its codes. The mean of the map is score.bits. Writes
- * columns * rows floats, row by row from the top left. The cells divide a frame of any shape evenly. `capacity` is the
- * room in `bits`, in floats.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little room; before the first frame). Does not block. */
+/* Writes the map of the latest frame: for each cell, the mean bits of its codes. The mean of the map is score.bits.
+ * Writes columns * rows floats, row by row from the top left. The cells divide a frame of any shape evenly. `capacity`
+ * is the capacity of `bits`, in floats.
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (`capacity` is too small; before the first frame). Does not
+ * block. */
 MAQ_API maq_status maq_novelty_copy_map(const maq_novelty* novelty, float* bits, size_t capacity);
 
-/* Decodes the codes of the latest frame to an image: the detail that the network kept. Lost detail cannot raise the
- * score. RGB, 64 x 64 pixels with the SDK's bundle, whatever the frame's shape. Timestamp and sequence are the frame's;
- * maq_frame_get_origin returns MAQ_FRAME_PREDICTED with a horizon of 0. The first call opens a second network. `*frame`
- * comes from a pool of 4: give it back with maq_frame_release.
+/* Decodes the codes of the latest frame to an image. It shows the detail that the network kept; lost detail cannot
+ * raise the score. The image is RGB, 64 x 64 pixels with the SDK's bundle, whatever the frame's shape. Timestamp and
+ * sequence are the frame's; maq_frame_get_origin returns MAQ_FRAME_PREDICTED with a horizon of 0. The first call opens
+ * another network. `*frame` comes from a pool of 4: give it back with maq_frame_release.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (also before the first frame), MAQ_ERROR_POOL_EMPTY,
  * MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_INFERENCE. Blocks while the network runs. */
 MAQ_API maq_status maq_novelty_acquire_reconstruction(maq_novelty* novelty, maq_frame** frame);

@@ -37,7 +37,7 @@ typedef enum maq_pipeline_state {
   MAQ_PIPELINE_STALLED = 5,      /* the camera sends no frames; it may recover by itself */
   MAQ_PIPELINE_RECONNECTING = 6, /* the camera was lost; the pipeline tries to reopen it for reconnect_ms */
   MAQ_PIPELINE_ENDED = 7,        /* the source has no more frames: the photo was processed, the clip ended */
-  MAQ_PIPELINE_FAILED = 8        /* the source or the model cannot be used; maq_pipeline_info says why */
+  MAQ_PIPELINE_FAILED = 8        /* the source or the model cannot be used; maq_pipeline_get_info says why */
 } maq_pipeline_state;
 
 /* Receives each result on the pipeline's thread, which waits meanwhile: return promptly. The callee owns `result` and
@@ -111,16 +111,16 @@ MAQ_API maq_status maq_pipeline_create(maq_context* context, const maq_pipeline_
  * loading of the model is done; does not wait for a device that hangs. */
 MAQ_API void maq_pipeline_destroy(maq_pipeline* pipeline);
 
-/* Opens a source in place of the current one, by a URI (maq_source_create). The state becomes MAQ_PIPELINE_OPENING. No
+/* Opens a source by a URI (maq_source_create) and replaces the current one. The state becomes MAQ_PIPELINE_OPENING. No
  * result of the previous source can be acquired after the call; a callback with one may still run. After
- * MAQ_PIPELINE_FAILED, source and model are tried again. maq_pipeline_info reports errors of the opening.
+ * MAQ_PIPELINE_FAILED, source and model are tried again. maq_pipeline_get_info reports errors of the opening.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_source(maq_pipeline* pipeline, const char* uri);
 
-/* Loads a model in place of the current one. NULL: no model runs, and results have a frame only. The source stays open;
- * a photo is processed again. The app may destroy its handle after the call. After MAQ_PIPELINE_FAILED, source and
- * model are tried again. maq_pipeline_info reports errors of the loading. Any thread. Errors:
- * MAQ_ERROR_INVALID_ARGUMENT (another pipeline runs the model). Does not block. */
+/* Loads a model and replaces the current one. NULL: no model runs, and results have a frame only. The source stays
+ * open; a photo is processed again. The app may destroy its handle after the call. After MAQ_PIPELINE_FAILED, source
+ * and model are tried again. maq_pipeline_get_info reports errors of the loading.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another pipeline runs the model). Does not block. */
 MAQ_API maq_status maq_pipeline_set_model(maq_pipeline* pipeline, maq_model* model);
 
 /* Pauses with 1, resumes with 0. A paused pipeline finishes the current frame, then takes no more. The source stays
@@ -129,8 +129,8 @@ MAQ_API maq_status maq_pipeline_set_model(maq_pipeline* pipeline, maq_model* mod
 MAQ_API maq_status maq_pipeline_set_paused(maq_pipeline* pipeline, int32_t is_paused);
 
 /* Records the frames that are processed from now on to a file (recorder.h), which must not exist yet. NULL finishes the
- * recording; so does the end or a change of the source. If the recording fails, results continue, and maq_pipeline_info
- * reports the reason.
+ * recording; so does the end or a change of the source. If the recording fails, results continue, and
+ * maq_pipeline_get_info reports the reason.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_pipeline_set_recording(maq_pipeline* pipeline, const char* path);
 

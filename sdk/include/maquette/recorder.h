@@ -38,8 +38,8 @@ MAQ_API maq_status maq_recorder_create(maq_context* context, const char* path, c
                                        const maq_recorder_config* config, maq_recorder** recorder);
 
 /* Adds a frame. The file contains the whole frame when the call returns. Frames may differ in size and format.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the previous frame), MAQ_ERROR_UNSUPPORTED (a
- * predicted frame, without keep_predicted), MAQ_ERROR_UNWRITABLE (the disk is full: earlier frames stay readable, and
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (not later than the previous frame). MAQ_ERROR_UNSUPPORTED (a
+ * predicted frame, without keep_predicted). MAQ_ERROR_UNWRITABLE (the disk is full: earlier frames stay readable, and
  * adding works again once there is space). Blocks while it writes. */
 MAQ_API maq_status maq_recorder_add_frame(maq_recorder* recorder, const maq_frame* frame);
 

@@ -1,5 +1,5 @@
 /* Scenes: built from a capture (posed photos and a point cloud), rendered from new viewpoints. No network is trained
- * for an environment (NPBG++, arXiv 2203.13318; docs/guide/scenes.md).
+ * for an environment (NPBG++, arXiv 2203.13318; docs/guide/scene.md).
  *
  *   maq_capture* capture;          maq_capture_open(context, "folder", &capture);
  *   maq_scene* scene;              maq_scene_build(context, NULL, capture, &scene);
@@ -11,7 +11,7 @@
  * An app with its own point cloud and cameras adds its photos to a maq_scene_builder.
  *
  * Lengths are in the unit of the cloud and the cameras ("units of the scene"). A scene is rendered with the bundle that
- * built it. Objects may be destroyed in any order: each keeps what it needs. */
+ * built it. Objects may be destroyed in any order. */
 #ifndef MAQUETTE_SCENE_H_
 #define MAQUETTE_SCENE_H_
 
@@ -41,12 +41,12 @@ typedef struct maq_scene_build_config {
                               share/maquette/models/scenes-int8. MAQ_THREADS_MEASURED is not supported. */
   int32_t long_side_px; /* larger photos are scaled down to this long side. 0: 640; MAQ_SCENE_LONG_SIDE_FULL: never */
   int32_t coefficient_bits; /* of each number of a descriptor: 8, 16, or 32 (floats, then also positions). 0: 8 */
-  /* Points whose descriptors vary less than this between photos are stored without view dependence. The unit is RMS,
+  /* Points with descriptors that vary less than this between photos are stored without view dependence. Unit: RMS,
    * for colours of 0 to 1; a larger value makes a smaller file. 0: 0.05, or with 8 bits the value at which half of the
    * points are view-dependent, if that is larger. MAQ_SCENE_VARIATION_ALL: all points are view-dependent. */
   double min_variation;
   /* Fraction of a photo's resolution at which visibility is tested, 1/16 to 1. A smaller fraction lets each point hide
-   * more of what is behind it; use it for sparse clouds. 0: 1 */
+   * more of the points behind it; use it for sparse clouds. 0: 1 */
   double visibility_scale;
   double near_depth;   /* a camera does not see points nearer than this along its axis; units of the scene. 0: all */
   uint64_t max_points; /* larger clouds are thinned out evenly. 0: no limit */
@@ -56,7 +56,7 @@ typedef struct maq_scene_build_config {
   maq_progress_callback progress_callback; /* of maq_scene_build and maq_scene_builder_add_view; may be NULL */
   void* progress_user_data;                /* passed to progress_callback */
   /* For maq_scene_build only: */
-  uint32_t max_views;   /* of more photos an even selection is used. 0: no limit */
+  uint32_t max_views;   /* if there are more photos, an even selection is used. 0: no limit */
   int32_t use_held_out; /* 1: also use photos that the capture holds out for comparison; 0: do not */
 } maq_scene_build_config;
 
@@ -146,7 +146,7 @@ typedef struct maq_scene_info {
   uint32_t struct_size;
   int32_t coefficient_bits; /* 8, 16 or 32 */
   uint64_t point_count;
-  uint64_t view_dependent_count;       /* points whose descriptors depend on the viewing direction */
+  uint64_t view_dependent_count;       /* points with descriptors that depend on the viewing direction */
   uint64_t block_count;                /* boxes of neighbouring points, the units of frustum culling */
   double up[3];                        /* of the world; unit vector */
   double bounds_min[3], bounds_max[3]; /* of the points, in the world */
@@ -192,7 +192,7 @@ typedef struct maq_scene_renderer_config {
   maq_model_options model; /* the network: the bundle that built the scene. MAQ_THREADS_MEASURED is not supported. */
   double near_depth;       /* points nearer to the camera along its axis are not drawn; units of the scene */
   int32_t use_background;  /* 1: images are composed over `background` by their alpha. 0: pixels without points have the
-                              mean colour that the photos show beside the points. */
+                              mean colour of the photos where they show no point. */
   uint8_t background[3];   /* red, green, blue; with use_background */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64. 0: 4 */
 } maq_scene_renderer_config;

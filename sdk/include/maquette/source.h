@@ -135,10 +135,10 @@ MAQ_API maq_status maq_source_get_info(const maq_source* source, maq_source_info
  * are known. `timeout_ns` limits the wait for live sources (MAQ_WAIT_FOREVER: no limit). Files and stubs ignore it.
  * `*frame` comes from a pool of frame_pool_size: release it promptly with maq_frame_release. A camera's frame lies in
  * memory of the device, which has few buffers. The camera drops frames while the app holds all of them.
- * One at a time. Errors: MAQ_END_OF_STREAM after the last frame, MAQ_TIMEOUT, MAQ_CANCELLED (the source is stopped),
- * MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY (the app holds all frames), MAQ_ERROR_UNREADABLE (a clip ends before its
- * header says, after all readable frames; or a damaged frame of a recording, which is skipped), MAQ_ERROR_BUSY (a
- * concealer takes the frames). Blocks while decoding. */
+ * One at a time. Errors: MAQ_END_OF_STREAM (after the last frame), MAQ_TIMEOUT, MAQ_CANCELLED (the source is stopped),
+ * MAQ_ERROR_DEVICE_LOST, MAQ_ERROR_POOL_EMPTY (the app holds all frames). MAQ_ERROR_UNREADABLE: a clip ends before its
+ * header says, after all readable frames; or a damaged frame of a recording is skipped. MAQ_ERROR_BUSY (a concealer
+ * takes the frames). Blocks while decoding. */
 MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_ns, maq_frame** frame);
 
 /* Gets a file descriptor for poll, epoll or an Android looper. It is readable when maq_source_acquire_frame would not
@@ -183,9 +183,9 @@ typedef struct maq_camera_info {
   uint32_t struct_size;
   const char* uri;     /* for maq_source_create: "v4l2:/dev/video0" */
   const char* name;    /* the device's own name; "" when it cannot be opened */
-  const char* bus;     /* where it is plugged in */
-  maq_status status;   /* MAQ_OK, or why it cannot be opened now */
-  const char* problem; /* the status in a sentence, and what to do */
+  const char* bus;     /* the port that the camera is plugged into */
+  maq_status status;   /* MAQ_OK, or the reason why the camera cannot be opened now */
+  const char* problem; /* the status in a sentence, with the remedy */
   uint32_t mode_count;
 } maq_camera_info;
 

@@ -1,4 +1,4 @@
-/* Status codes, error text, version, and what every other header of Maquette uses. */
+/* Status codes, error text, version, and declarations that all other headers use. */
 #ifndef MAQUETTE_TYPES_H_
 #define MAQUETTE_TYPES_H_
 
@@ -32,10 +32,10 @@ typedef enum maq_status {
   MAQ_OK = 0,
   MAQ_ERROR_INVALID_ARGUMENT = 1, /* a NULL, an out-of-range value, a wrong struct_size, an ill-formed URI */
   MAQ_ERROR_VERSION_MISMATCH = 2, /* the app's headers do not fit this library */
-  MAQ_ERROR_NOT_FOUND = 3,        /* a file, a folder, or what a call looks for does not exist */
+  MAQ_ERROR_NOT_FOUND = 3,        /* the file, folder or item that a call asks for does not exist */
   MAQ_ERROR_UNREADABLE = 4,       /* a file is there but cannot be decoded: damaged, truncated or another format */
   MAQ_ERROR_IMAGE_SIZE = 5,       /* an image has no pixels, or more than the limits in frame.h */
-  MAQ_ERROR_BAD_BUNDLE = 6,       /* a model bundle is incomplete, changed, or not what its manifest says */
+  MAQ_ERROR_BAD_BUNDLE = 6,       /* a model bundle is incomplete or changed, or contradicts its manifest */
   MAQ_ERROR_UNSUPPORTED = 7,      /* this build or version cannot do it: unknown URI scheme, pixel format */
   MAQ_ERROR_RUNTIME_LIBRARY = 8,  /* ONNX Runtime or libmaquette_files.so: not found, cannot be opened, or too old */
   MAQ_ERROR_POOL_EMPTY = 9,       /* every frame or result of the pool is still held: release one */
@@ -69,8 +69,8 @@ typedef enum maq_provider {
 /* Whether idle threads of a network spin, waiting for the next layer. Values never change meaning. */
 typedef enum maq_spinning {
   MAQ_SPINNING_DEFAULT = 0, /* the SDK's choice: MAQ_SPINNING_ON in this version */
-  MAQ_SPINNING_ON = 1,      /* they spin for a while: faster */
-  MAQ_SPINNING_OFF = 2      /* they sleep: saves energy */
+  MAQ_SPINNING_ON = 1,      /* idle threads spin for a while: faster */
+  MAQ_SPINNING_OFF = 2      /* idle threads sleep: saves energy */
 } maq_spinning;
 
 /* A file in the app's memory, for systems without a file system (phones, browsers). The call that takes it copies it:
@@ -81,9 +81,9 @@ typedef struct maq_memory_file {
   size_t size_bytes;
 } maq_memory_file;
 
-/* How the networks of a system are loaded and run: a member of each config whose system has networks. All zero is the
- * default. The bundle is a folder with manifest.json, or its files in memory; set one of the two, or none to use the
- * bundle installed with the library. Paths and files are copied. */
+/* How the networks of a system are loaded and run. Each config of a system with networks has this member. All zero is
+ * the default. The bundle is a folder with manifest.json, or the files of this folder in memory. Set one of the two. If
+ * neither is set, the bundle installed with the library is used. Paths and files are copied. */
 typedef struct maq_model_options {
   int32_t threads;       /* 1 to 64; 0: the machine's large cores, at most 4; MAQ_THREADS_MEASURED: measured */
   maq_spinning spinning; /* default MAQ_SPINNING_DEFAULT */
@@ -95,16 +95,16 @@ typedef struct maq_model_options {
 } maq_model_options;
 
 /* Receives the progress of a long call, on the thread of that call. `done` is the finished fraction, 0 to 1. `stage` is
- * a sentence that says what runs now; it is valid during the callback. `user_data` is the config's progress_user_data.
- * Return 0 to cancel the call, which then returns MAQ_CANCELLED; return anything else to go on. The callback must not
- * use the object that calls it, except for its `_cancel`, and must not throw. */
+ * a sentence about the current step; it is valid during the callback. `user_data` is the config's progress_user_data.
+ * Return 0 to cancel the call, which then returns MAQ_CANCELLED; return anything else to continue. The callback must
+ * not use the object that calls it, except for its `_cancel`, and must not throw. */
 typedef int32_t (*maq_progress_callback)(void* user_data, double done, const char* stage);
 
 /* Returns the status as written in the enum ("MAQ_ERROR_NOT_FOUND"), "unknown status" for other values.
  * The text is static. Any thread. Does not fail or block. */
 MAQ_API const char* maq_status_get_name(maq_status status);
 
-/* Returns a sentence that says what was wrong and what to do. With NULL: for the latest failed call of this thread,
+/* Returns a sentence with the cause of an error and its remedy. With NULL: for the latest failed call of this thread,
  * with or without a handle. With a handle: for the latest failed call on that handle, on any thread. Returns "" if no
  * call failed. A failure to create an object counts as a call on the context. Calls that succeed do not clear the text.
  * The text is the library's and stays valid until this thread calls maq_last_error again.

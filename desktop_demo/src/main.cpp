@@ -39,20 +39,19 @@ int main(int argc, char** argv) try {
   std::string path, view = "parts", compare = "none", layer = "depth", shading = "colour", size = "1280x800";
 
   CLI::App cli(
-      "Shows the body surface of the people before the camera, live, on the processor alone; flies through scenes;\n"
-      "shows sharp edges in depth; makes 3D heads; predicts the next frames of a camera and scores "
-      "their novelty.\n\n"
+      "Shows the body surface of the people in front of a camera, live, on the CPU. Other views fly through scenes,\n"
+      "show sharp edges in depth, make 3D heads, predict frames of a camera, and score the novelty of frames.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
       "  maquette-demo room.maqs --capture room --compare slider\n"
-      "  maquette-demo photo.jpg --head      a 3D head of the person in a photo, or in the first picture of a camera\n"
-      "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, a picture:\n"
+      "  maquette-demo photo.jpg --head      a 3D head of the person in a photo, or in the first image of a camera\n"
+      "  maquette-demo --edges               edges and sizes of solids; or of a depth camera, a recording, an image:\n"
       "  maquette-demo --edges 'image:depth.png?depth_unit=0.001&fov=60'\n"
       "  maquette-demo --predict             now, and the predicted frame 200 ms later (--ahead)\n"
       "  maquette-demo --predict --conceal 'stub:people?stall=300ms@3s'\n"
       "                                      predicted frames, marked in magenta, while the camera stalls\n"
-      "  maquette-demo --predict --novelty   also how unexpected each frame is, where, and the events\n"
+      "  maquette-demo --predict --novelty   also the novelty of each frame: map, curve and events\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
@@ -60,17 +59,19 @@ int main(int argc, char** argv) try {
   auto* const source = cli.add_option("--source", options.source, "A source by its URI")->excludes("PATH");
   cli.add_flag(
       "--edges", options.edges,
-      "Sharp edges of a depth camera, a recording or a depth picture; default: " + std::string(kRenderedSolids));
-  cli.add_option("--layer", layer, "Of edges, under their curves")
+      "Show sharp edges of a depth camera, a recording or a depth image; default: " + std::string(kRenderedSolids));
+  cli.add_option("--layer", layer, "Edges: image below the curves")
       ->capture_default_str()
       ->check(CLI::IsMember(maquette::kEdgeLayerNames));
-  cli.add_flag("--curves,!--no-curves", options.edges_model.finds_curves, "Of edges, with corners and boxes");
-  cli.add_flag("--boxes,!--no-boxes", options.edges_model.finds_boxes, "Measured, of edges");
-  cli.add_flag("--skip-planes", skip_planes, "Edges: the network runs where depth is not plane; faster");
-  cli.add_flag("--head", options.head, "A 3D head of the person in the first picture; later by the key G")
+  cli.add_flag("--curves,!--no-curves", options.edges_model.finds_curves, "Edges: find curves, corners and boxes");
+  cli.add_flag("--boxes,!--no-boxes", options.edges_model.finds_boxes, "Edges: measure boxes");
+  cli.add_flag("--skip-planes", skip_planes, "Edges: skip the network where depth is flat; faster");
+  cli.add_flag("--head", options.head, "Make a 3D head of the person in the first image; the key G makes one later")
       ->excludes("--edges");
-  cli.add_option("--shading", shading, "Of heads")->capture_default_str()->check(CLI::IsMember(kShadingNames));
-  cli.add_option("--fit-seconds", options.fit_seconds, "Of heads: the time for the fit to the pixels")
+  cli.add_option("--shading", shading, "Heads: meaning of the colours")
+      ->capture_default_str()
+      ->check(CLI::IsMember(kShadingNames));
+  cli.add_option("--fit-seconds", options.fit_seconds, "Heads: time for the fit to the pixels")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
   auto* const predict = cli.add_flag("--predict", options.predict, "Show the source and its predicted frame")
@@ -80,55 +81,53 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->needs(predict)
       ->check(CLI::Range(kMinAheadMs, kMaxAheadMs));
-  cli.add_option(
-         "--method", method,
-         "How frames are predicted. auto: last and motion, blended by their past errors; refined: auto, refined "
-         "by a network")
+  cli.add_option("--method", method,
+                 "Method of prediction. auto: last and motion, blended by their past errors; refined: auto, refined "
+                 "by a network")
       ->capture_default_str()
       ->needs(predict)
       ->check(CLI::IsMember(kMethodNames));
   cli.add_flag("--conceal", options.prediction.conceals_gaps,
                "Fill gaps of at most 300 ms with predicted frames, which are marked")
       ->needs(predict);
-  cli.add_flag("--novelty", options.prediction.scores_novelty,
-               "Score how unexpected each frame is: a map, a curve, and the events")
+  cli.add_flag("--novelty", options.prediction.scores_novelty, "Show the novelty of each frame: map, curve and events")
       ->needs(predict);
   cli.add_flag("--entropy", options.prediction.shows_entropy, "Show uncertain cells of the predicted frame in red")
       ->needs(predict);
-  cli.add_flag("--sample", options.prediction.shows_sample, "Show one sampled future beside them")->needs(predict);
+  cli.add_flag("--sample", options.prediction.shows_sample, "Also show one sampled future")->needs(predict);
   cli.add_option("--prediction-bundle", options.prediction.bundle,
                  "Folder of the networks for novelty, entropy, samples and --method refined");
-  cli.add_option("--view", view, "What is shown first")->capture_default_str()->check(CLI::IsMember(kViewNames));
-  cli.add_flag("--mesh,!--no-mesh", options.mesh,
-               "The body's surface in the corner, with what is seen of it in colour");
-  cli.add_option("--texture", options.texture, "Worn in the try-on view: a DensePose atlas (2:3), or any picture")
+  cli.add_option("--view", view, "View at the start")->capture_default_str()->check(CLI::IsMember(kViewNames));
+  cli.add_flag("--mesh,!--no-mesh", options.mesh, "Show the template body in the corner, with visible parts in colour");
+  cli.add_option("--texture", options.texture, "Outfit of the try-on view: a DensePose atlas (2:3), or any image")
       ->check(CLI::ExistingFile);
   cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of")
       ->check(CLI::ExistingDirectory);
-  cli.add_option("--compare", compare, "Photo against rendering; of heads: slider")
+  cli.add_option("--compare", compare, "Compare photo and rendering; heads: slider only")
       ->capture_default_str()
       ->check(CLI::IsMember(kCompareNames));
   cli.add_option("--bundle", options.bundle, "Folder of the dense pose networks");
   cli.add_option("--scene-bundle", options.scene_bundle, "Folder of the scene networks");
   cli.add_option("--edges-bundle", options.edges_bundle, "Folder of the edge network");
   cli.add_option("--heads-bundle", options.heads_bundle, "Folder of the heads' network");
-  cli.add_option("--threads", options.model.model.threads, "Of the networks; 0: the large cores, at most 4")
+  cli.add_option("--threads", options.model.model.threads, "Threads of the networks; 0: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
-  cli.add_option("--key-frames", options.model.key_frame_interval, "People are looked for in one of so many frames")
+  cli.add_option("--key-frames", options.model.key_frame_interval, "Detect people in every N-th frame")
       ->check(CLI::Range(1, 1000));
   cli.add_option("--frame-budget", options.live.frame_budget_ms,
-                 "Milliseconds that the networks may take for a frame; they do less where they take longer")
+                 "Time in milliseconds that the networks may take for a frame; they then do less work")
       ->check(CLI::Range(0.0, 60000.0));
-  cli.add_flag("--part-only", part_only, "No U and V: faster");
-  cli.add_option("--size", size, "Of the window")->capture_default_str();
-  cli.add_option("--out", options.out, "Folder of snapshots, clips and recordings; default: this one")
+  cli.add_flag("--part-only", part_only, "Compute only body parts: faster; U and V stay 0");
+  cli.add_option("--size", size, "Size of the window")->capture_default_str();
+  cli.add_option("--out", options.out, "Folder of snapshots, clips and recordings; default: the current folder")
       ->check(CLI::ExistingDirectory);
   auto* const headless = cli.add_flag("--headless", options.headless, "No visible window; ends with a line of JSON");
-  cli.add_option("--frames", options.frames, "End after so many frames")
+  cli.add_option("--frames", options.frames, "End after N frames")
       ->capture_default_str()
       ->needs(headless)
       ->check(CLI::Range(1, 1000000));
-  cli.add_option("--pointer", options.pointer_px, "Where the pointer is, as X,Y in pixels of the depth (edges)")
+  cli.add_option("--pointer", options.pointer_px,
+                 "Position of the pointer, as X,Y in pixels of the depth image (edges)")
       ->expected(2)
       ->delimiter(',')
       ->needs(headless);

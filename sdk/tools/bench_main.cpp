@@ -271,12 +271,13 @@ int main(int argc, char** argv) try {
   app.add_option("--seconds", options.seconds, "Minimum time of each source, or case, in seconds (default 3)")
       ->check(CLI::Range(0.0, 86400.0));
   app.footer(
-      "A frame is counted from asking the source for it to having the result. CPU ms is the CPU time of all threads\n"
-      "for one frame, a measure of its energy on every machine. Compare figures of one run; a warning says why\n"
-      "times are unreliable: other processes busy, few runs, wide spread.\n\n"
-      "With --predict all cases run in turn over the same 16 frames of the source, held in memory: samples at 64 x 64\n"
-      "pixels, the others at full size. A run of novelty is one frame with its map. A run of a predictor pushes one\n"
-      "frame and predicts the next; a run of \"11 sampled\" samples 11 frames and decodes one.\n\n"
+      "The time of a frame begins when the source is asked for it and ends with the result. CPU ms is the CPU time of\n"
+      "all threads for one frame; it is a measure of energy on every machine. Compare times of one run only. A "
+      "warning\n"
+      "says why times are unreliable: other processes, few runs, wide spread.\n\n"
+      "With --predict all cases run alternately over the same 16 frames of the source, held in memory. Samples are\n"
+      "computed at 64 x 64 pixels, other cases at full size. A run of novelty is one frame with its map. A run of a\n"
+      "predictor pushes one frame and predicts the next. A run of \"11 sampled\" samples 11 frames and decodes one.\n\n"
       "Examples:\n"
       "  maquette bench\n"
       "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json\n"

@@ -7,8 +7,8 @@
 
 int main(int argc, char** argv) try {
   CLI::App app(
-      "Maquette: dense pose of people in images, clips and cameras, edges in frames of depth cameras, heads and "
-      "scenes from photos, on the CPU.");
+      "Maquette: dense pose of people, edges in depth frames, heads and scenes from photos, and prediction of frames, "
+      "on the CPU.");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());
   app.footer(

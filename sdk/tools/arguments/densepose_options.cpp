@@ -21,16 +21,16 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
       ->check(CLI::Range(1, 1000));
   command
       .add_option("--min-person-height", options.min_person_height_px,
-                  "People less tall than this, in pixels, may be missed; large values are faster")
+                  "People less tall than N pixels may be missed; large values are faster")
       ->check(CLI::Range(0, 100000));
   command
       .add_option("--crops", options.crops,
-                  "Look again at people in crops of the frame, rotated upright: off (default), auto (who is small or "
-                  "leans), all. Finer and slower")
+                  "Map people a second time, in upright crops of the frame: off (default), auto (people who are small "
+                  "or lean), all. Finer and slower")
       ->check(CLI::IsMember({"off", "auto", "all"}));
-  command.add_option("--crop-size", options.crop_px, "Side of these crops in pixels (default 192)")
+  command.add_option("--crop-size", options.crop_px, "Side of a crop in pixels (default 192)")
       ->check(CLI::Range(64, 512));
-  command.add_flag("--no-surface", options.no_surface, "Compute only body parts, which is faster: U and V stay 0");
+  command.add_flag("--no-surface", options.no_surface, "Compute only body parts: faster; U and V stay 0");
 }
 
 std::string bundle_of(const ModelOptions& options) {

@@ -24,14 +24,15 @@ void add_network_options(CLI::App& command, NetworkOptions& options, const std::
   command.add_option("--bundle", options.bundle,
                      "Folder of the model bundle; default: " + variable + ", then the one installed with this program");
   command
-      .add_option("--threads", options.threads,
-                  "Threads of the networks, or \"measured\": as many as pay on this machine; default: the large cores, "
-                  "at most 4")
+      .add_option(
+          "--threads", options.threads,
+          "Threads of the networks, or \"measured\": the smallest number within 5 % of the fastest time; default: "
+          "the large cores, at most 4")
       ->transform(CLI::Validator(read_threads, "1 to 64, or measured"));
   command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
   command
       .add_option("--provider", options.provider,
-                  "What runs the networks' layers: cpu (default), or xnnpack or nnapi where ONNX Runtime has them")
+                  "Library that runs the networks' layers: cpu (default); xnnpack or nnapi if ONNX Runtime has them")
       ->check(CLI::IsMember(kProviders));
 }
 

@@ -50,8 +50,7 @@ SourceArgument parse_source_argument(const std::string& text) {
     return {"file:" + escaped(text), fs::path(text).stem().string()};
   }
   if (scheme.empty()) {
-    throw std::runtime_error(text +
-                             " does not exist; check the path, or see `maquette sources` for what else there is.");
+    throw std::runtime_error(text + " does not exist; check the path, or list other sources with `maquette sources`.");
   }
   const std::string target = text.substr(colon + 1, text.find('?', colon) - colon - 1);
   if (scheme == "file" || scheme == "image" || scheme == "video" || scheme == "rec")

@@ -169,9 +169,10 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_model_options(*command, options->model);
   command
-      ->add_option("--roll", options->roll_deg,
-                   "The pictures show the world rotated clockwise by so many degrees: people are mapped as if it stood "
-                   "upright")
+      ->add_option(
+          "--roll", options->roll_deg,
+          "Roll of the camera: the frames show the world rotated clockwise by N degrees. The networks see upright "
+          "people")
       ->check(CLI::Range(-360.0, 360.0));
   add_frame_limits(*command, options->limits);
   command->footer(

@@ -164,7 +164,7 @@ int look_at_cameras() {
 }  // namespace
 
 void add_doctor_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("doctor", "Find out why a camera does not work, and what to do");
+  CLI::App* command = app.add_subcommand("doctor", "Find out why a camera does not work, with the remedy");
   command->footer("Exit status: 0 if at least one camera can be used, 1 if none can.");
   command->callback([=] { *exit_code = look_at_cameras(); });
 }

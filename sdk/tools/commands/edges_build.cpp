@@ -110,18 +110,19 @@ void add_edges_build_command(CLI::App& edges, int* exit_code) {
       edges.add_subcommand("build", "Find the sharp edges of an object or a room in depth images with known cameras");
   command
       ->add_option("capture", options->capture,
-                   "Folder with a transforms.json whose frames name depth images (\"depth_file_path\")")
+                   "Folder with a transforms.json that names a depth image for each frame (\"depth_file_path\")")
       ->required();
   command
       ->add_option("-o,--out", options->out,
-                   "File of the curves, by its ending json, obj, ply, dxf or step; replaces an existing one")
+                   "File of the curves: .json, .obj, .ply, .dxf or .step; replaces an existing one")
       ->required();
   command
       ->add_option("--min-views", options->min_views,
-                   "Leave out curves that fewer views have seen (default 2; 1: none)")
+                   "Drop curves that fewer views have seen (default 2; 1: drop none)")
       ->check(CLI::Range(1, 1000));
   command
-      ->add_option("--cell", options->cell_m, "Distance of the points that are fused, metres; default: that of pixels")
+      ->add_option("--cell", options->cell_m,
+                   "Distance between fused points in metres; default: the footprint of the median pixel")
       ->check(CLI::PositiveNumber);
   add_network_options(*command, options->network, "MAQ_EDGES_BUNDLE");
   command->footer(

@@ -78,7 +78,8 @@ std::string edges_bundle_or_default(const std::string& given) {
 void add_edges_info_command(CLI::App& edges, int* exit_code) {
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = edges.add_subcommand("info", "Check the network and print its name, size, licence and errors");
-  command->add_option("--bundle", options->bundle, "Its folder; default: MAQ_EDGES_BUNDLE, or the installed one");
-  command->add_flag("--json", options->json, "Print it as JSON");
+  command->add_option("--bundle", options->bundle,
+                      "Folder of the network; default: MAQ_EDGES_BUNDLE, then the installed bundle");
+  command->add_flag("--json", options->json, "Print the information as JSON");
   command->callback([=] { *exit_code = show(*options); });
 }

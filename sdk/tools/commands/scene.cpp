@@ -63,7 +63,7 @@ nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_
 }
 
 void add_scene_command(CLI::App& app, int* exit_code) {
-  CLI::App* scene = app.add_subcommand("scene", "Scenes from photos: build one, render it from new viewpoints");
+  CLI::App* scene = app.add_subcommand("scene", "Build a scene from photos, and render it from new viewpoints");
   scene->require_subcommand(1);
   scene->footer(
       "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
@@ -72,7 +72,7 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   add_scene_build_command(*scene, exit_code);
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = scene->add_subcommand("info", "Check a scene file and print what it contains");
+  CLI::App* command = scene->add_subcommand("info", "Check a scene file and print its content");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
   command->add_option("--json", options->json, "Also write this information to this file");
   command->callback([=] { *exit_code = show(*options); });

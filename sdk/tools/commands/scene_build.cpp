@@ -154,7 +154,7 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--visibility-scale", options->visibility_scale,
-                   "Test visibility at this fraction of the resolution; below 1 for sparse clouds")
+                   "Test visibility at this fraction of the photos' resolution; below 1 for sparse clouds")
       ->check(CLI::Range(1.0 / 16, 1.0));
   command
       ->add_option("--near", options->near_depth, "Ignore points nearer to a camera than this, in units of the scene")

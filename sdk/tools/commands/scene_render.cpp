@@ -214,7 +214,7 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
 
 int render(const RenderOptions& options) {
   if (options.views.empty() == options.path.empty()) {
-    throw std::runtime_error("Say what to render: --views with --capture for images, or --path for a clip.");
+    throw std::runtime_error("Nothing to render: give --views with --capture for images, or --path for a clip.");
   }
   if (options.path.empty() ? options.is_timed_clip : options.repeat != 1 || options.no_alpha) {
     throw std::runtime_error(options.path.empty() ? "--seconds and --fps are for clips: use them with --path."
@@ -248,7 +248,7 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
       ->check(CLI::IsMember({"orbit", "through"}));
   command->add_option("--seconds", options->seconds, "Length of the clip in seconds")->check(CLI::Range(0.04, 600.0));
   command->add_option("--fps", options->fps, "Frames a second of the clip")->check(CLI::Range(1.0, 240.0));
-  command->add_option("--capture", options->capture, "Folder of the capture whose cameras are used");
+  command->add_option("--capture", options->capture, "Folder of the capture with the cameras");
   command->add_option("--views", options->views,
                       "Photos of the capture to render: held-out, all, or names with commas");
   command->add_option("--size", options->size, "Size of the images, such as 640x480; default: the size of the photo");

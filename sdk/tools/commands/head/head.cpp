@@ -460,12 +460,12 @@ void add_photo_options(CLI::App& command, HeadOptions& options) {
       ->check(CLI::Range(int64_t(1), int64_t(64)));
   command
       .add_option("--person", options.person,
-                  "The person in a photo of several: 1 has the largest head (default), 2 the next; all makes one file "
-                  "each (head_1.glb, head_2.glb)")
+                  "Person in a photo of several: 1 (default) has the largest head, 2 the next; all writes a file each "
+                  "(head_1.glb, head_2.glb)")
       ->check(CLI::Validator(check_person, "1 to 255, or all"));
   command
       .add_option("--box", options.box,
-                  "Box of the head with its hair, in pixels: left,top,right,bottom; people are not detected then")
+                  "Box of the head with its hair, in pixels: left,top,right,bottom; default: people are detected")
       ->delimiter(',')
       ->expected(4);
   command.add_option("--roll", options.roll_deg, "Rotation of the head in the photo, clockwise, degrees")
@@ -511,19 +511,20 @@ void add_mesh_options(CLI::App& command, HeadOptions& options) {
   CLI::Option* const triangles =
       command
           .add_option("--triangles", options.triangles,
-                      "Number of triangles, about (default 60000, or all with --cell), or all; games and phones want "
-                      "2000 to 50000")
+                      "Approximate number of triangles (default 60000, or all with --cell), or all; 2000 to 50000 suit "
+                      "games and phones")
           ->check(CLI::Validator(check_triangles, "100 or more, or all"));
   CLI::Option* const cell =
       command
-          .add_option("--cell", options.cell_mm,
-                      "Distance of the full mesh's vertices, mm (default 2.1, or 1.6 for more than 60000 triangles)")
+          .add_option(
+              "--cell", options.cell_mm,
+              "Distance between vertices of the full mesh, mm (default 2.1, or 1.6 for more than 60000 triangles)")
           ->check(CLI::Range(0.5, 20.0));
   add_topology_option(command, options.topology)->excludes(triangles)->excludes(cell);
   CLI::Option* const texture =
       command
           .add_option("--texture", options.texture_px,
-                      "Give the head a texture with the photos' pixels; pixels a side, 256 to 2048, such as 1024")
+                      "Give the head a texture with the photos' pixels; N pixels a side, 256 to 2048, such as 1024")
           ->check(CLI::Range(256u, 2048u));
   command
       .add_flag("--mirror-unseen", options.mirror_unseen,
@@ -537,11 +538,11 @@ void add_mesh_options(CLI::App& command, HeadOptions& options) {
 
 constexpr char kHeadFooter[] =
     "The mesh is closed, coloured and in metres, with y up and the face to the front. It ends below the chin. A photo\n"
-    "does not tell the size of a head: it is the average size, unless --pupils or --depth tells.\n"
+    "does not tell the size of a head: it is an average size, unless --pupils or --depth gives the size.\n"
     "Parts that no photo shows, such as the back of the head, follow from similar heads. More photos of the same\n"
     "person, from the sides, help; each may have another camera. Faces should be 64 pixels or more across.\n\n"
     "A face is biometric data: ask the person. Nothing leaves this machine. A saved head holds no photo, unless\n"
-    "--texture asks for a texture, which has the face's pixels.\n\n"
+    "--texture adds the pixels of the face.\n\n"
     "Examples:\n"
     "  maquette head photo.jpg --out head.glb\n"
     "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"

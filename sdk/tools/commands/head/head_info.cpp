@@ -132,6 +132,6 @@ void add_head_info_command(CLI::App& head, int* exit_code) {
   command->add_option("head", options->path, "File that `maquette head --save` wrote")->required();
   command->add_option("--bundle", options->bundle,
                       "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");
-  command->add_flag("--json", options->json, "Print it as JSON, in metres");
+  command->add_flag("--json", options->json, "Print the information as JSON, in metres");
   command->callback([=] { *exit_code = show_head(*options); });
 }

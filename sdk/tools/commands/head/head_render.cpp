@@ -147,12 +147,12 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
       ->check(CLI::IsMember(kShadingNames));
   command
       ->add_option("--yaw", view.yaw_deg,
-                   "Angle of the camera to the person's left of the front, degrees; clips begin there")
+                   "Angle of the camera from the front to the person's left, degrees; clips begin there")
       ->check(CLI::Range(-3600.0, 3600.0));
-  command->add_option("--pitch", view.pitch_deg, "Angle of the camera above, degrees")->check(CLI::Range(-90.0, 90.0));
+  command->add_option("--pitch", view.pitch_deg, "Angle of the camera upwards, degrees")
+      ->check(CLI::Range(-90.0, 90.0));
   command
-      ->add_option("--photo", view.photo,
-                   "Use the camera of this photo, from 1; the image lies on the head in the photo")
+      ->add_option("--photo", view.photo, "Use the camera of photo N (from 1): the image matches the head in the photo")
       ->check(CLI::Range(1, 256));
   command->add_option("--size", options->size, "Size of the image (default 640x480)");
   command->add_option("--seconds", view.seconds, "Length of a clip (default 6)")->check(CLI::Range(0.04, 600.0));
@@ -163,20 +163,22 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
       ->expected(3)
       ->check(CLI::Range(0, 255));
   command->add_flag("--no-alpha", options->no_alpha,
-                    "Write a PNG over the background; without this option it is transparent there");
-  CLI::Option* const cell =
-      command->add_option("--cell", options->cell_mm, "Distance of the mesh's vertices, mm; default: 60,000 triangles")
-          ->check(CLI::Range(0.5, 20.0));
+                    "Write a PNG with the background; default: transparent around the head");
+  CLI::Option* const cell = command
+                                ->add_option("--cell", options->cell_mm,
+                                             "Distance between vertices of the mesh, mm; default: 60,000 triangles")
+                                ->check(CLI::Range(0.5, 20.0));
   add_topology_option(*command, options->topology)->excludes(cell);
   command->add_option("--bundle", options->bundle,
                       "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");
   command->add_option("--threads", view.threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command->footer(
-      "Shadings: colour and shape in soft light; normals: red to the right, green up, blue to the camera; template: "
-      "where\n"
-      "each point lies on the template head, red to the person's left, green to the back, blue up; depth: near is "
-      "white.\n\n"
+      "Shadings:\n"
+      "  colour, shape   the head's colours, or grey, in soft light\n"
+      "  normals         red to the right, green up, blue to the camera\n"
+      "  template        position on the template head: red to the person's left, green to the back, blue up\n"
+      "  depth           near is white, far is black\n\n"
       "Examples:\n"
       "  maquette head photo.jpg --save head.maqh\n"
       "  maquette head render head.maqh --out view.png --yaw 30 --pitch 10\n"

@@ -183,12 +183,11 @@ int score_stream(const NoveltyOptions& options) {
 void add_novelty_command(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<NoveltyOptions>();
   CLI::App* command =
-      app.add_subcommand("novelty", "Score how unexpected each frame of a clip or camera is, and name the events");
+      app.add_subcommand("novelty", "Score how unexpected each frame of a clip or camera is, and report events");
   command->add_option("source", options->source, "Source of the frames; see `maquette sources`")->required();
   command
       ->add_option("--threshold", options->threshold,
-                   "Ratio of an event: this many times the bits of the 8 frames before, or this many times fewer; "
-                   "default: 4")
+                   "Ratio of an event: N times the bits of the 8 frames before, or 1/N of them; default: 4")
       ->check(CLI::Range(1.001, 1e6));
   command->add_option("--max-frames", options->max_frames, "Stop after N frames; default: at the end, or at Ctrl-C")
       ->check(CLI::Range(int64_t(1), int64_t(1) << 40));

@@ -279,8 +279,7 @@ class PredictionRun {
 
 int predict(const PredictOptions& options) {
   if (options.out.empty() && !options.compare) {
-    throw std::runtime_error(
-        "Nothing is to be done: name a clip or folder with --out, or print errors with --compare.");
+    throw std::runtime_error("Nothing to do: name a clip or folder with --out, or print errors with --compare.");
   }
   catch_interrupts();
   return PredictionRun(options).run();
@@ -290,10 +289,10 @@ void add_frame_options(CLI::App& command, PredictOptions& options) {
   command.add_option("source", options.source, "Source of the frames; see `maquette sources`")->required();
   command
       .add_option("--from", options.from,
-                  "Number of the last frame that is seen, from 0; default: 30, or less in a "
+                  "Number of the last frame before the prediction, from 0; default: 30, or less in a "
                   "short clip")
       ->check(CLI::Range(int64_t(0), int64_t(1) << 40));
-  command.add_option("-n,--frames", options.frames, "Predict N frames after it; default: 16")
+  command.add_option("-n,--frames", options.frames, "Predict N frames after --from; default: 16")
       ->check(CLI::Range(int64_t(1), int64_t(10000)));
   const std::map<std::string, maq_predictor_method> methods = {{"auto", MAQ_PREDICTOR_AUTO},
                                                                {"last", MAQ_PREDICTOR_LAST},
@@ -302,11 +301,11 @@ void add_frame_options(CLI::App& command, PredictOptions& options) {
                                                                {"sampled", MAQ_PREDICTOR_SAMPLED}};
   command
       .add_option("-m,--method", options.method,
-                  "last: the last frame. motion: everything moves on at its speed. auto (default): both blended per "
-                  "cell, by their past errors. refined: auto, refined by a network. sampled: one possible future")
+                  "last: the last frame. motion: every pixel continues its motion. auto (default): both, blended by "
+                  "their past errors. refined: auto, refined by a network. sampled: one possible future")
       ->transform(CLI::CheckedTransformer(methods));
   command.add_flag("-c,--compare", options.compare,
-                   "Print the errors (PSNR) by time ahead, and draw truth and methods side by side");
+                   "Print the errors (PSNR) by time ahead, and show truth and methods side by side");
 }
 
 void add_sample_options(CLI::App& command, SampleOptions& sampling) {
@@ -344,7 +343,8 @@ void add_predict_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files");
   command->add_flag("--json", options->json, "Print one JSON document");
   command->footer(
-      "A clip begins with the last second that was seen. Predicted frames have a border with their time ahead; PNG\n"
+      "A clip begins with the last second before the prediction. Predicted frames have a border with their time ahead; "
+      "PNG\n"
       "files are also marked inside. PSNR is in dB: higher is better, and +1 dB is an error 11 % smaller.\n\n"
       "Examples:\n"
       "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"

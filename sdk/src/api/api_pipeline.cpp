@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 
-// Of the thread that asked, like the text of maq_last_error.
+// Texts for the calling thread, like the text of maq_last_error.
 thread_local std::string given_problem, given_uri;
 
 using ResultPool = BoundedPool<maq_pipeline_result>;

@@ -23,7 +23,7 @@ inline PinholeCamera pinhole_of(const maq_pinhole_camera& given) {
   return camera;
 }
 
-// Of an image to be rendered.
+// For an image to render. Throws MAQ_ERROR_INVALID_ARGUMENT for a camera with distortion.
 inline PinholeCamera undistorted_pinhole_of(const maq_pinhole_camera& given) {
   require_struct_size("camera", given.struct_size, sizeof(maq_pinhole_camera));
   if (is_distorted(given.intrinsics)) {

@@ -1,4 +1,4 @@
-// What every handle of the C API begins with, and the context.
+// The common base of all handles of the C API, and the context.
 #pragma once
 
 #include <cstddef>
@@ -59,7 +59,7 @@ class HandleOf : public Handle {
 
 class MotionWorkspaces;
 
-// What the objects made from a context keep of it when it is destroyed before them.
+// The part of a context that its objects keep when the context is destroyed before them.
 class ContextState {
  public:
   ContextState(Log log, std::string onnxruntime_path) : log_(log), onnxruntime_path_(std::move(onnxruntime_path)) {}

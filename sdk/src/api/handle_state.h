@@ -1,5 +1,4 @@
-// What a handle is, whether the app has it and of which process it is, so that misuse is told before anything is
-// touched.
+// The kind of a handle, whether the app holds it, and its process. Misuse is detected before an object is touched.
 #pragma once
 
 #include <atomic>

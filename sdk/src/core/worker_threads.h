@@ -19,10 +19,10 @@ inline constexpr int kMaxThreads = 64;
 // The numbers of the cores that this thread may run on, as of now; empty where the system does not tell.
 std::vector<int> allowed_cores();
 
-// How many of the cores `allowed` are large. Phones and boards pair a few with several that take less power and are
-// some three times slower, so that all others would wait for their part of a network. By the capacity that the system
-// gives them, else by their highest frequency; all of them where it tells neither for one of them. `folder`: with cpu0,
-// cpu1, …, as Linux has it.
+// Returns the number of large cores among `allowed`. Phones and boards combine a few large cores with several small
+// ones, which are some three times slower: the large cores would wait for them. Cores are compared by the capacity that
+// the system reports, or else by their highest frequency. Returns all cores if one of them has neither. `folder`
+// contains cpu0, cpu1, ….
 int count_large_cores(const std::vector<int>& allowed, const std::string& folder = "/sys/devices/system/cpu");
 
 // The default: as many as there are large cores, but at most 4. More do not pay for networks of this size.

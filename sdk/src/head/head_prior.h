@@ -1,5 +1,5 @@
-// What is known of heads before one is seen: the field's bases, where points of a template head lie on a head of given
-// codes, and where a head ends. Plain data; files/ reads it, fit/ uses it.
+// The statistical model of heads: the field's bases, the points of a template head on a head with given codes, and the
+// clip plane of a head. Plain data; files/ reads it, fit/ uses it.
 #pragma once
 
 #include <array>
@@ -60,9 +60,9 @@ struct HeadPrior {
   int colour_codes() const { return bases.colour_codes(); }
 };
 
-// What is wrong with such a part of a prior or of a head: "its domain is …"; empty where nothing is. A cut's normal has
-// length 1 (within 1e-3); bounds hold 0 and end within kMaxHeadExtent_dm; names have 1 to kMaxLandmarkName bytes, no
-// two are alike, and landmarks lie within twice kMaxHeadExtent_dm.
+// Returns the fault of such a part of a prior or of a head ("its domain is …"), or an empty text. A clip plane's normal
+// has length 1 (within 1e-3). Bounds contain 0 and end within kMaxHeadExtent_dm. Names are unique and have 1 to
+// kMaxLandmarkName bytes. Landmarks lie within twice kMaxHeadExtent_dm.
 std::string cut_fault(const CutPlane& cut);
 std::string bounds_fault(const HeadBounds& bounds);
 std::string landmarks_fault(const std::vector<NamedPoint>& landmarks);

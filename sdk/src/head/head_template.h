@@ -12,7 +12,7 @@ namespace maq::head {
 inline constexpr size_t kMaxTemplatePoints = 65535;  // and vertices
 inline constexpr size_t kMaxTemplateTriangles = 1 << 18, kMaxActions = 256;
 
-// What a point is. The values are stored: new ones come at the end.
+// The kind of a point. The values are stored: new ones are added at the end.
 enum class TemplateKind : uint8_t {
   kInside,  // of the skin behind the surface
   kSurface,
@@ -42,7 +42,7 @@ struct HeadTemplate {
   size_t point_count() const { return kinds.size(); }
 };
 
-// What is wrong with a template: "it has 0 points, …"; empty where nothing is.
+// Returns the fault of a template ("it has 0 points, …"), or an empty text.
 std::string template_fault(const HeadTemplate& head);
 
 }  // namespace maq::head

@@ -66,8 +66,9 @@ struct StoredHead {
   std::array<uint8_t, 32> prior_sha256{};  // of the prior's file, which the codes belong to; zeros: not known
 };
 
-// What is wrong with a head, "one of its cameras …"; empty where nothing is. All numbers must be finite, sizes agree,
-// cameras rotate (within 1e-6), see pictures of 1 to MAQ_MAX_SIDE_PX and have focal lengths of 1e-3 to 1e9 pixels.
+// Returns the fault of a head ("one of its cameras …"), or an empty text. All numbers must be finite, and sizes must
+// agree. Cameras have orthonormal rotations (within 1e-6), images of 1 to MAQ_MAX_SIDE_PX, and focal lengths of 1e-3 to
+// 1e9 pixels.
 std::string stored_head_fault(const StoredHead& head);
 
 }  // namespace maq::head

@@ -30,8 +30,8 @@ struct ResizeAxis {
   std::vector<int> first;     // [to_px]; first + taps <= from_px
   std::vector<float> weight;  // [to_px, taps]
 
-  // Area weights when shrinking, bilinear ones with half-pixel centres when growing, as OpenCV has them. Does nothing
-  // when it is made for these sizes already.
+  // Area weights when shrinking, bilinear ones with half-pixel centres when growing, like OpenCV. Does nothing if it is
+  // prepared for these sizes already.
   void prepare(int from, int to, bool shrinks);
 };
 

@@ -91,8 +91,8 @@ struct Pipeline::State {
   bool is_opening = false;   // it opens a source, which may hang
   bool in_callback = false;  // it is in a callback of the app
   bool is_photo = false;     // the source has one frame
-  // Of the thread: stopped, opening, loading, running, ended or failed; while it runs, of the camera: running, stalled
-  // or reconnecting.
+  // State of the thread: stopped, opening, loading, running, ended or failed. While it runs, state of the camera:
+  // running, stalled or reconnecting.
   maq_pipeline_state phase = MAQ_PIPELINE_STOPPED, camera = MAQ_PIPELINE_RUNNING;
   maq_status failure = MAQ_OK;
   std::string problem, camera_problem;
@@ -104,7 +104,7 @@ struct Pipeline::State {
   PipelineStats counts;
   std::shared_ptr<LiveModelUse> model;  // the one that is loaded; the thread alone runs it
 
-  // Of the thread alone. Source and model are done when their numbers are those of the request.
+  // Used only by the thread. Source and model are done when their numbers equal the request's.
   Request now;
   uint64_t heard_number = 0;
   std::unique_ptr<Source> source;
@@ -214,7 +214,7 @@ struct Pipeline::State {
     return true;
   }
 
-  // What the latest request asks for, or the next frame.
+  // Does what the latest request asks for, or processes the next frame.
   void step() {
     maq_pipeline_state at = MAQ_PIPELINE_STOPPED;
     {

@@ -7,7 +7,7 @@ namespace maq {
 
 inline constexpr int kFeatures = 8;  // of a descriptor; the first three are red, green and blue in 0..1
 inline constexpr int kBasis = 6;     // functions of the viewing direction that it is linear in
-// What a view-dependent descriptor has beside its constant term: [kBasis][kFeatures].
+// Linear terms of a view-dependent descriptor, beyond its constant term: [kBasis][kFeatures].
 inline constexpr size_t kLinearTerms = size_t(kBasis) * kFeatures;
 
 }  // namespace maq

@@ -67,7 +67,7 @@ HeadPrior prior_of(const Bundle& bundle) {
   return read_prior(bytes.data(), bytes.size(), bundle.path_of(name));
 }
 
-// Of the digest's text, which read_bundle() compared with the file.
+// Converts the digest's text, which read_bundle() compared with the file.
 std::array<uint8_t, 32> digest_of(const std::string& hexadecimal) {
   std::array<uint8_t, 32> digest{};
   for (size_t i = 0; i < digest.size(); ++i) digest[i] = uint8_t(std::stoi(hexadecimal.substr(2 * i, 2), nullptr, 16));

@@ -1,4 +1,5 @@
-// What a bundle for heads has (docs/formats.md): the encoder, the prior and, where it has one, the template head.
+// The content of a bundle for heads (docs/reference/formats.md): the encoder, the prior and, optionally, the template
+// head.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ struct FaceSpec {
   bool contains(Vec3 template_point) const { return length(template_point - center_dm) < radius_dm; }
 };
 
-// What the encoder sees, and what it says of that.
+// The encoder's input and output.
 struct EncoderSpec {
   CellGrid cells;
   double crop_sides = 1.6;       // side of the crop by the longer side of the head's box, hair included

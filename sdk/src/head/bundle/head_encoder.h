@@ -47,9 +47,9 @@ class HeadEncoder {
   int threads() const { return threads_; }  // in use
   maq_provider provider() const { return session_->provider(); }
 
-  // Of a photo in any format but depth; the crop is bilinear, of pixels averaged before where it is coarser. Memory of
-  // `encoding` is reused. Not for two threads at once. Throws as check_square() does, MAQ_ERROR_UNSUPPORTED for depth,
-  // MAQ_ERROR_INFERENCE, also where no cell has finite numbers, MAQ_CANCELLED.
+  // Encodes a photo in any format except depth. The crop is interpolated bilinearly, from averaged pixels where it is
+  // coarser than the photo. Memory of `encoding` is reused. Not for two threads at once. Throws as check_square() does,
+  // MAQ_ERROR_UNSUPPORTED for depth, MAQ_ERROR_INFERENCE (also if no cell has finite numbers), MAQ_CANCELLED.
   void run(const ImageView& photo, const HeadSquare& square, const RunCancel& cancel, HeadEncoding& encoding);
 
  private:

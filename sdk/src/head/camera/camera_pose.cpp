@@ -124,7 +124,7 @@ class PoseSearch {
     centre_y_ = median_of(points_, [](const PosePoint& p) { return p.y; });
     radius_px_ = median_of(points_, [&](const PosePoint& p) { return std::hypot(p.x - centre_x_, p.y - centre_y_); });
     sigma_px_ = median_of(points_, [](const PosePoint& p) { return p.sigma_px; });
-    // What a pose of three noisy points may be off by elsewhere.
+    // The possible error, at other points, of a pose from three noisy points.
     coarse_limit_ = std::pow(std::max(6.0, 0.05 * radius_px_ / sigma_px_), 2);
     Dice dice;
     sample_ = all_;
@@ -253,8 +253,8 @@ bool are_collinear(const std::vector<PosePoint>& points, const std::vector<size_
   return false;
 }
 
-// Of rotation, translation of the head's frame and log focal, from the information of the scaled pose. False where the
-// rotation is not held.
+// Computes the covariance of rotation, translation of the head's frame and log focal length, from the information of
+// the scaled pose. Returns false if the photo does not determine the rotation.
 bool find_covariance(const ScaledPose& pose, Vec3 origin, PoseInformation& information, int unknowns,
                      std::array<double, 49>& covariance) {
   double inverse[49] = {};

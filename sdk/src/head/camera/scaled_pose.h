@@ -39,7 +39,7 @@ class ScaledProjection {
   explicit ScaledProjection(const ScaledPose& pose)
       : pose_(pose), scale_(std::exp(pose.log_scale)), ratio_(std::exp(pose.log_scale - pose.log_focal)) {}
 
-  // Of a point given from the origin.
+  // Projects a point that is given relative to the origin.
   SeenPoint project(Vec3 p) const {
     const Vec3 q = pose_.rotation * p;
     const double w = 1 + q.z * ratio_;
@@ -49,7 +49,7 @@ class ScaledProjection {
   PixelJacobian jacobian(const SeenPoint& at) const {
     const double s = scale_, k = ratio_, by_w = 1 / at.depth_ratio;
     const Vec3 q = at.turned;
-    // Of the pixel by q: (s, 0, -x k) and (0, s, -y k), over the depth ratio; of q by the rotation: -[q]x.
+    // Derivatives of the pixel by q: (s, 0, -x k) and (0, s, -y k), over the depth ratio; of q by the rotation: -[q]x.
     const double xz = -at.x_px * k, yz = -at.y_px * k, deeper = (at.depth_ratio - 1) * by_w;
     return {{{by_w * xz * q.y, by_w * (s * q.z - xz * q.x), by_w * -s * q.y, by_w, 0, by_w * s * q.x - at.x_px * deeper,
               at.x_px * deeper},
@@ -87,7 +87,7 @@ inline HeadCamera camera_of(const ScaledPose& pose, Vec3 origin, double cx_px, d
   return {{pose.rotation, at - pose.rotation * origin}, std::exp(pose.log_focal), cx_px, cy_px};
 }
 
-// Of a camera that has the origin in front of it.
+// For a camera with the origin in front of it.
 inline ScaledPose scaled_pose_of(const HeadCamera& camera, Vec3 origin) {
   const Vec3 at = camera.head_to_camera * origin;
   const double s = camera.focal_px / at.z;

@@ -23,8 +23,9 @@ struct FieldPoints {
 using Planes = std::array<float*, 3>;
 using ConstPlanes = std::array<const float*, 3>;
 
-// What forward() fills in: arrays of as many as there are points. Planes that are null are left out. Where all six of
-// the surface are, its network does not run; where all three of `normal` are, it is not computed.
+// The output arrays of forward(), with one element for each point. Planes that are null are left out. If all six planes
+// of the surface are null, its network does not run. If all three planes of `normal` are null, the normal is not
+// computed.
 struct FieldValues {
   float* distance = nullptr;
   Planes rgb{};  // logits

@@ -15,7 +15,7 @@ enum class FieldIsa {
 
 const char* field_isa_name(FieldIsa isa);
 
-// Those of this processor and this build, the fastest last.
+// Returns the instruction sets that this processor and this build support, the fastest last.
 std::vector<FieldIsa> supported_field_isas();
 FieldIsa fastest_field_isa();
 

@@ -1,9 +1,9 @@
-// What the field engine computes in vectors, once for each instruction set. The sources that define these are compiled
-// with flags of their own, so they include nothing that other sources could take a function from: plain numbers only.
+// The vector computations of the field engine, once for each instruction set. The sources that define them are compiled
+// with their own flags. They include no header with functions that other sources could use: plain numbers only.
 //
 // Points lie in blocks of kFieldBlock columns: a matrix [rows][kFieldBlock] has a row for each input or output of a
-// layer. All memory is aligned to 64 bytes. A tangent is the derivative of such a matrix where each point moves along a
-// vector of its own.
+// layer. All memory is aligned to 64 bytes. A tangent is the derivative of such a matrix when each point moves along
+// its own vector.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,7 @@ struct FieldKernels {
   // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock], sines and cosines within 2e-7 for angles up to
   // 2,000. A point that is not finite is NaN in all rows that depend on it.
   void (*encode)(const float* points, int octaves, float* encoding);
-  // What the encoding changes by where the points move along direction [3][kFieldBlock].
+  // The change of the encoding when the points move along direction [3][kFieldBlock].
   void (*encode_tangent)(const float* encoding, const float* direction, int octaves, float* tangent);
   // Adds the gradient by the points, from that by the encoding: [3][kFieldBlock].
   void (*encode_backward)(const float* encoding, const float* gradient, int octaves, float* points_gradient);
@@ -37,7 +37,7 @@ struct FieldKernels {
   void (*affine_activated)(const float* packed, const float* bias, int rows, int depth, float smoothing,
                            const float* in, float* out);
 
-  // Of squareplus a, from what it gave (out): from the gradient by that to the gradient by what it was given.
+  // The gradient by the input of squareplus, from its output (out) and the gradient by the output.
   void (*activation_backward)(const float* out, int rows, float smoothing, const float* gradient, float* result);
   // tangent: of what it was given -> of what it gave; bend gets a'' times the former.
   void (*activation_tangent)(const float* out, int rows, float smoothing, float* tangent, float* bend);

@@ -277,8 +277,8 @@ void weight_gradient(const float* gradient, int outputs, const float* in, int in
 
 // --- the encoding ----------------------------------------------------------------------------------------------------
 
-// Of the angle less the nearest multiple of pi / 2, which is taken off in three parts (Cody and Waite), by polynomials
-// of Cephes (sinf, cosf).
+// Sine and cosine of the angle minus the nearest multiple of pi / 2, which is subtracted in three parts (Cody and
+// Waite), by polynomials of Cephes (sinf, cosf).
 inline void sine_and_cosine(Vector angle, Vector& sine, Vector& cosine) {
   const Vector rounding = broadcast(12582912.0f);  // 1.5 * 2^23: rounds what it is added to
   const Vector quarters = multiply_add(angle, broadcast(0.636619772f), rounding);

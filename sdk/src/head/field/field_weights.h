@@ -42,7 +42,8 @@ using ConstFieldLayer = FieldLayerOf<const float>;
 struct FieldLayerPlace {
   size_t weights, bias, stride, end;
 };
-// Of all layers, one after the other from 0 on; each ends at a multiple of 64. Throws as check_field_shape() does.
+// Returns the offsets of all layers, one after the other from 0 on; each ends at a multiple of 64. Throws as
+// check_field_shape() does.
 std::vector<FieldLayerPlace> field_layer_places(const FieldShape& shape);
 
 class FieldWeights {

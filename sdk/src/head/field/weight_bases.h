@@ -29,7 +29,8 @@ class WeightBases {
   // W0, and all layers that are not personal.
   FieldWeights& constant() { return constant_; }
   const FieldWeights& constant() const { return constant_; }
-  // What `code` adds to a personal layer. Throws MAQ_ERROR_INTERNAL for a layer that is not, or a code too high.
+  // The change of a personal layer for one unit of `code`. Throws MAQ_ERROR_INTERNAL for another layer, or a code that
+  // is too high.
   FieldLayer basis_layer(int layer, int code);
 
   // W0 and all bases are finite numbers.

@@ -30,7 +30,7 @@ struct StoredShape {
 
 // constant: each layer's weights [outputs][inputs] and bias [outputs].
 // bases: of each personal geometry layer weights [shape codes][outputs][inputs] and bias [shape codes][outputs]; then
-// of each personal surface layer likewise, for colour codes.
+// of each personal surface layer the same for colour codes.
 // anchors: float32 template points [anchors][3], mean [anchors][3]; float16 linear [anchors][3][shape codes];
 // float32 sigma [anchors].
 // landmarks: of each u8 length of its name, the name, float32 template point [3].

@@ -18,7 +18,7 @@ constexpr StoredFormat kStoredHalf = StoredFormat::kFloat16, kStoredFloat = Stor
 constexpr float kMaxHalf = 65504;
 constexpr uint32_t kFirstHeadFileVersion = 1;  // it is read, too
 
-// Of files that begin as one of that version does; else the one that is written.
+// The version of a file that begins like this version; otherwise the version that is written.
 uint32_t version_to_read(const void* bytes, size_t count) {
   FileStart start;
   if (count < sizeof start) return kHeadFileVersion;

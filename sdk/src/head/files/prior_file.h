@@ -18,7 +18,7 @@ inline constexpr uint64_t kMaxPriorFileBytes = uint64_t(32) << 20;
 // field that the engine does not take, or more than kMaxPriorFileBytes.
 HeadPrior read_prior(const void* bytes, size_t count, const std::string& name);
 
-// Of a file alone. Throws what read_file() throws besides.
+// Reads one file. Also throws the errors of read_file().
 HeadPrior read_prior_file(const std::string& path);
 
 }  // namespace maq::head

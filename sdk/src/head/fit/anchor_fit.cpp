@@ -38,7 +38,7 @@ class JointFit {
     }
   }
 
-  // Of the codes, from the inverse of the equations' matrix; nothing where that cannot be had.
+  // The covariance of the codes, from the inverse of the equations' matrix; empty if the matrix cannot be inverted.
   std::vector<float> code_covariance() {
     set_up();
     std::vector<double> inverse(size_ * codes_);

@@ -13,7 +13,8 @@ namespace maq::head {
 // With the terms of AnchorTermOptions, N(0, 1) for each code and the photo's prior for its focal length.
 struct AnchorFitOptions {
   AnchorTermOptions terms;
-  // Of a photo's cells, so many must agree with the head that all photos say, or the photo shows no head, or another's.
+  // Minimum fraction of a photo's cells that agree with the head of all photos. A photo with fewer shows no head, or
+  // the head of another person.
   double min_inlier_fraction = 0.3;
   int max_steps = 16;  // of Levenberg-Marquardt
 };
@@ -31,7 +32,7 @@ struct PhotoFit {
 };
 
 struct AnchorFit {
-  // Of the mean head where no photo has part.
+  // Codes of the mean head if no photo is used.
   std::vector<float> shape_codes;
   std::vector<float> code_sigmas;      // their standard deviations after all; 1: the photos say nothing of it
   std::vector<float> code_covariance;  // [codes][codes]; the identity where the photos say nothing

@@ -11,10 +11,10 @@ namespace maq::head {
 
 class DistanceGrid {
  public:
-  // Of `side`^3 corners, 2 to 128, over the prior's domain; the head ends at the prior's cut.
+  // Creates a grid of `side`^3 corners, 2 to 128, over the prior's domain; the head ends at the prior's clip plane.
   DistanceGrid(const HeadBounds& bounds, const CutPlane& cut, int side);
 
-  // Of the weights that the engine has.
+  // Computes the distances from the current weights of the engine.
   void update(const FieldEngine& engine, WorkerThreads& threads);
 
   // The first point of base + depth * direction, with depth > first, that lies in the head; else the one nearest to it.

@@ -18,7 +18,7 @@ constexpr int kMaxRefusals = 10;
 constexpr double kMinRate = 0.2;      // of the rates, at which a fit without a gain ends
 constexpr int kWarmUp = 5;            // steps over which the rates rise
 constexpr double kFarStep = 2;        // a loss this many times the usual one is refused
-constexpr double kFarCheck = 1.3;     // likewise, of the pixels held out
+constexpr double kFarCheck = 1.3;     // the same for the loss of held-out pixels
 constexpr size_t kPixelsForAll = 16;  // photos, beyond which each is looked at with fewer pixels
 
 class Shuffle {  // SplitMix64, Fisher and Yates
@@ -179,7 +179,7 @@ class Fitter {
     }
   }
 
-  // What a ray's loss is worth where `count` of them stand for all pixels.
+  // Weight of a ray's loss when `count` rays represent all pixels.
   double ray_weight(const FitRays& level, size_t count) const {
     const double cells = level.cells_per_ray * double(level.fitted.size() + level.held_out.size());
     return count > 0 ? options_.ray_weight * cells / double(count) : 0;

@@ -13,10 +13,10 @@
 
 namespace maq::head {
 
-// What is minimised is a negative log posterior: 1/2 |z|^2 for all codes, the focal length's prior, `anchor_weight`
-// times the terms of stage 0, and those of rays (RayTermOptions), of which `ray_weight` a cell of the encoder count:
-// its neighbours say the same, and light and shadow are in no term. With 0.3, as much as then a cell of stage 0, faces
-// of held-out heads became 10 % worse in 5 s; with 0.03 they stay within 2 %.
+// The objective is a negative log posterior: 1/2 |z|^2 for all codes, the focal length's prior, `anchor_weight` times
+// the terms of stage 0, and the terms of rays (RayTermOptions). `ray_weight` rays count for each cell of the encoder:
+// neighbouring rays say the same, and no term models light and shadow. With 0.3 (then the weight of a cell in stage 0),
+// faces of held-out heads became 10 % worse in 5 s; with 0.03 they stay within 2 %.
 struct HeadFitOptions {
   AnchorFitOptions anchors;
   RayTermOptions rays;
@@ -30,9 +30,9 @@ struct HeadFitOptions {
   // The most that a step changes a code by, or a camera: radians, and the same of its scale and focal length. They fall
   // to a tenth at the last step.
   double shape_rate = 0.03, colour_rate = 0.05, camera_rate = 0.003;
-  // Of the pixels, so many are held out of the fit. Every check_steps steps it is they that say whether the head is
-  // better than the best so far. After `patience` checks without a gain of min_gain of the whole the best is taken up
-  // again with half the rates; after the fourth time it ends.
+  // Fraction of the pixels that are held out of the fit. Every check_steps steps, they decide whether the head is
+  // better than the best so far. After `patience` checks without a relative gain of min_gain, the fit continues from
+  // the best head with half the rates; after the fourth time it ends.
   double held_out_fraction = 0.05;
   int check_steps = 10, patience = 3;
   double min_gain = 1e-3;
@@ -52,7 +52,7 @@ enum class HeadFitEnd {
 // A sentence for the log.
 const char* head_fit_end_text(HeadFitEnd end);
 
-// Of the whole objective, by the pixels held out; anchors, prior and focal are not estimates.
+// Terms of the whole objective, estimated from the held-out pixels; anchors, prior and focal are exact.
 struct HeadLosses {
   double colour = 0, matte = 0, point = 0, normal = 0, anchors = 0, prior = 0;
 

@@ -1,4 +1,4 @@
-// What the encoder says of a photo, as observations in the photo's pixels.
+// The encoder's output for a photo, as observations in pixels of the photo.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace maq::head {
 
-// Of the encoder's output [side][side][kCellChannels]: template point x, y, z (dm), log of its sigma, logit of the
-// matte, normal x, y, z.
+// Channels of the encoder's output [side][side][kCellChannels]: template point x, y, z (dm), log of its sigma, logit of
+// the head's mask, normal x, y, z.
 inline constexpr size_t kCellChannels = 8;
 
 // "At this pixel one sees that point of the template head, give or take sigma."

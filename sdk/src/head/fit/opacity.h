@@ -20,7 +20,7 @@ class RayOpacity {
 
   // [sections]: the transmittance before each times its alpha.
   const std::vector<float>& weights() const { return weights_; }
-  // Of the whole ray, at most 0; -infinity is never reached with finite distances.
+  // Log transmittance of the whole ray, at most 0; never -infinity with finite distances.
   double log_transmittance() const { return log_transmittance_; }
   double opacity() const;  // the sum of the weights
 

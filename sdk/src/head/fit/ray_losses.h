@@ -1,5 +1,5 @@
-// What a ray of a photo says of the field, as losses with their derivatives: negative log likelihoods, where each error
-// e in squared sigmas costs 1/2 e / (1 + e / limit) (Geman-McClure): far off, it no longer pulls.
+// Losses of a photo's ray against the field, with derivatives: negative log likelihoods. An error e in squared sigmas
+// costs 1/2 e / (1 + e / limit) (Geman-McClure): a large error no longer pulls.
 #pragma once
 
 #include "core/math/vec3.h"
@@ -15,7 +15,7 @@ struct ThreeLoss {
 // The colour of logits against red, green and blue in 0..1, each with this sigma. By the logits.
 ThreeLoss colour_loss(const float* logits, const float* rgb, double sigma, double limit);
 
-// Of two points of the template head, each coordinate with this sigma (dm). By the first.
+// Loss of two points of the template head with this sigma (dm) in each coordinate; derivative by the first point.
 ThreeLoss template_loss(const float* point, const float* observed, double sigma_dm, double limit);
 
 // The normal that the camera sees, rotation g / |g| of the distance's gradient g, against one of length 1; each

@@ -56,7 +56,8 @@ class RayTerms {
   // show in a result.
   RayTerms(const FieldShape& shape, const CutPlane& cut, double sharpness, const RayTermOptions& options);
 
-  // Of `count` rays, with the weights of the engine and of the grid. `gradient` may be null; else it is overwritten.
+  // Sums the terms of `count` rays, with the weights of the engine and of the grid. `gradient` may be null; otherwise
+  // it is overwritten.
   RaySums run(const FieldEngine& engine, const DistanceGrid& grid, const std::vector<ScaledPose>& poses,
               const FitRay* const* rays, size_t count, WorkerThreads& threads, RayGradient* gradient);
 
@@ -69,7 +70,7 @@ class RayTerms {
     size_t ray;
     double depth;
   };
-  // What a part needs.
+  // Scratch memory of a part.
   struct Scratch {
     RaySums sums;
     std::vector<std::array<double, kPoseUnknowns>> by_poses;

@@ -1,4 +1,4 @@
-// What all files of meshes have in common: metres, y up, z to the front; and what their textures are.
+// The common properties of mesh files: metres, y up, z to the front; and the format of their textures.
 #pragma once
 
 #include <cmath>
@@ -26,7 +26,7 @@ inline std::vector<float> positions_in_file(const HeadMesh& mesh) {
   return to_file_axes(mesh.positions, [](const float*) { return 0.1; });
 }
 
-// Of length 1, or 0 where they were 0.
+// Normals of length 1, or 0 where they were 0.
 inline std::vector<float> normals_in_file(const HeadMesh& mesh) {
   return to_file_axes(mesh.normals, [](const float* n) {
     const double x = double(n[0]), y = double(n[1]), z = double(n[2]), length = std::sqrt(x * x + y * y + z * z);

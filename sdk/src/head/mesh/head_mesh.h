@@ -15,7 +15,7 @@ struct MorphTarget {
   std::vector<float> deltas;       // [vertices][3], decimetres
 };
 
-// What is empty is not known. Arrays of floats and bytes are by vertex.
+// An empty array is unknown. Arrays of floats and bytes are by vertex.
 struct HeadMesh {
   std::vector<float> positions;            // x, y, z, decimetres
   std::vector<float> normals;              // x, y, z, of length 1, outwards

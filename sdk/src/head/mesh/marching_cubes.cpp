@@ -67,7 +67,7 @@ struct EdgeVertex {
   double low = 0, high = 1, low_value = 0, high_value = 0, fraction = 0;
 };
 
-// Of the straight line between the two values; inside of the edge.
+// Interpolates linearly between the two values, inside of the edge.
 void interpolate(EdgeVertex& vertex) {
   const double share = vertex.low_value / (vertex.low_value - vertex.high_value);
   const double found = vertex.low + share * (vertex.high - vertex.low);
@@ -250,7 +250,7 @@ class SurfaceFinder {
     return {block[0] + corner % 3, block[1] + corner / 3 % 3, block[2] + corner / 9};
   }
 
-  // Those into which the surface goes on from a block.
+  // Adds the neighbours that continue the surface of a block.
   void add_neighbours(const Index3& block) {
     std::array<bool, 27> is_inside{};
     for (int corner = 0; corner < 27; ++corner) is_inside[size_t(corner)] = grid_.value(corner_of(block, corner)) < 0;

@@ -31,7 +31,7 @@ struct MarchingCubesOptions {
   float max_slope = 1.5f;
   // Steps of the secant method (regula falsi, Illinois) that move each vertex along its edge of the grid.
   int refine_steps = 2;
-  // Of the grid, beyond which the surface is refused: 16 bytes of memory each.
+  // Maximum number of grid points; larger surfaces are refused. Each point takes 16 bytes of memory.
   size_t max_points = 8 << 20;
 };
 

@@ -1,4 +1,4 @@
-// What becomes of a mesh before it is shown: one piece, with normals, and its cap known.
+// Prepares a mesh for display: one piece, with normals, and a known cap.
 #pragma once
 
 #include <array>

@@ -32,7 +32,7 @@ constexpr uint32_t kNoTriangle = UINT32_MAX;
 constexpr size_t kMaxSamples = 4;          // of a pixel
 constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther ones are of what is behind
 
-// What is linear in the pixel: a column + b row + c.
+// A linear function of the pixel: a column + b row + c.
 struct Plane {
   double a = 0, b = 0, c = 0;
 };
@@ -292,11 +292,11 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
                           double(texture->width_px()) * double(texture->height_px());
     return texture->level_of(std::abs(texels), std::abs(pixels));
   };
-  // Of a triangle, where a pixel's middle is or, outside of it, near that.
+  // The point of a triangle at a pixel's centre or, if the centre is outside of it, near the centre.
   const auto point_of = [&](uint32_t triangle, size_t row_px, size_t column_px, float depth) {
     const uint32_t* const indices = &mesh.triangles[3 * size_t(triangle)];
     const Vertex &p = vertices_[indices[0]], &q = vertices_[indices[1]], &r = vertices_[indices[2]];
-    // What a corner weighs is the volume of the pixel's ray and the other two.
+    // A corner's weight is the volume of the pixel's ray and the other two corners.
     const double x = (double(column_px) - camera.cx_px) / camera.focal_px;
     const double y = (double(row_px) - camera.cy_px) / camera.focal_px;
     const auto volume = [&](const Vertex& a, const Vertex& b) {

@@ -13,7 +13,7 @@
 
 namespace maq::head {
 
-// What colour a point of the surface gets.
+// The colour of a point of the surface.
 enum class MeshShading {
   kColour,    // its own, under the light: the texture's where there is one, else the vertices', else grey
   kShape,     // grey, under the light
@@ -74,7 +74,7 @@ class MeshRaster {
   std::vector<Attributes> attributes_;              // of each vertex
   std::vector<Rows> rows_, chunk_rows_;             // of each triangle, of each chunk of them
   std::vector<std::vector<float>> inverse_depths_;  // of the samples of a band, for each thread
-  std::vector<std::vector<uint32_t>> triangles_;    // likewise: that which is seen
+  std::vector<std::vector<uint32_t>> triangles_;    // the same: the visible triangle
 };
 
 }  // namespace maq::head

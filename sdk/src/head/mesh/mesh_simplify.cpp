@@ -289,8 +289,8 @@ class TriangleGrid {
     double best = std::numeric_limits<double>::infinity();
     const int reach = std::max({size_[0], size_[1], size_[2]});
     for (int shell = 0; shell <= reach; ++shell) {
-      // What is left is at least this far away, also from a point beside the grid, whose nearest in it is in the
-      // middle.
+      // The rest is at least this far away, also from a point outside of the grid, whose nearest position in the grid
+      // is in the middle.
       const double beyond = std::max(0, shell - 1) * side_;
       if (beyond * beyond >= best) break;
       for_shell(middle, shell, [&](size_t cube) {

@@ -1,4 +1,4 @@
-// What a head that was fitted before says of photos that are added later: it takes the place of the prior.
+// The prior that an earlier fitted head gives for photos that are added later; it replaces the prior of the bundle.
 #pragma once
 
 #include <cstddef>
@@ -25,10 +25,10 @@ class EarlierHead {
   const HeadPrior& prior() const { return prior_; }
   const StoredHead& head() const { return head_; }
 
-  // Of the bundle's prior, from those of prior().
+  // Converts codes of prior() to codes of the bundle's prior.
   FieldCodes codes(const FieldCodes& moved) const;
   std::vector<float> covariance(const std::vector<float>& moved) const;
-  // Of a head with these anchors: one of known size stays as large as it was.
+  // The scale of a head with these anchors; a head of known size keeps its size.
   HeadScale scale(const HeadScale& by_prior, const StoredAnchors& anchors) const;
 
  private:

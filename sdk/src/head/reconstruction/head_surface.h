@@ -19,7 +19,8 @@ struct SurfaceOptions {
   size_t triangles = kAllTriangles;  // about as many are left (simplify_mesh)
 };
 
-// Of a full mesh of which so many triangles are to be left: one of 2.1 mm has some 115,000, one of 1.6 mm 200,000.
+// Cell of a full mesh for this many remaining triangles. A cell of 2.1 mm gives some 115,000 triangles, 1.6 mm some
+// 200,000.
 constexpr double default_surface_cell_m(size_t triangles) { return triangles > 60000 ? 0.0016 : 0.0021; }
 
 struct SurfaceStats {
@@ -35,7 +36,7 @@ struct SurfaceStats {
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
                       SurfaceStats* stats = nullptr);
 
-// Of a colour of the field; 0 where it is no number.
+// The byte of a colour of the field; 0 if it is not a number.
 uint8_t byte_of_logit(float logit);
 
 struct HeadLandmark {

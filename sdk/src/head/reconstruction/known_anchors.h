@@ -12,8 +12,9 @@ namespace maq::head {
 // from their middle.
 double size_sigma(const HeadPrior& prior);
 
-// Of shape codes with that covariance, [codes][codes]. The sigmas are of what the codes do not say of a point, and of
-// what the photos leave of the codes, but for the size, which no photo tells: that is size_sigma().
+// Anchors of shape codes with this covariance, [codes][codes]. Sigmas include the part of a point that the codes do not
+// explain, and the uncertainty of the codes after the photos. They exclude the size, which no photo tells
+// (size_sigma()).
 StoredAnchors known_anchors(const HeadPrior& prior, const std::vector<float>& shape,
                             const std::vector<float>& covariance);
 

@@ -17,7 +17,7 @@ constexpr size_t kPointsOfTask = 512;
 
 using Rgb = std::array<uint8_t, 3>;
 
-// What no photo shows.
+// Colours of parts that no photo shows.
 std::optional<Rgb> colour_of(TemplateKind kind) {
   switch (kind) {
     case TemplateKind::kMouth: return Rgb{120, 62, 60};

@@ -14,7 +14,7 @@ constexpr int kSteps = 30, kLastSteps = 3;
 constexpr double kMaxStep_dm = 0.08, kDamping = 0.7;
 // How much the neighbours' displacement counts beside a point's own place, from the first step to the last.
 constexpr double kFirstStiffness = 1, kLastStiffness = 0.02;
-// Of a point whose template point is off by so much, the own place counts half.
+// With this residual of the template point, a point's own position has half of the weight.
 constexpr double kTrustedResidual_dm = 0.06;
 constexpr int kFollowSweeps = 200, kLetGoSweeps = 40, kLetGoRounds = 24;
 // A point that is farther from the surface, or whose template point is off by more, did not find its place.
@@ -165,7 +165,7 @@ class Registration {
     }
   }
 
-  // Of the skin, those that face away from where they do on the template.
+  // Triangles of the skin that face another way than on the template.
   std::vector<size_t> flipped() const {
     std::vector<size_t> found;
     for (size_t t = 0; t < corners_.size(); t += 3) {
@@ -208,7 +208,7 @@ class Registration {
     }
   }
 
-  // Of the points that actions move: hair does not count.
+  // The scale of the points that actions move: hair does not count.
   double scale_of_face() const {
     std::vector<uint8_t> moves(count_);
     for (const FacialAction& action : head_.actions) {

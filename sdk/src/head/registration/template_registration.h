@@ -19,8 +19,8 @@ struct TemplateRegistration {
   std::vector<float> points;   // [points of the template][3], dm, in the head's frame; finite
   std::vector<float> colours;  // [points][3]: of the field, logits
   double scale = 1;            // of the face by the template's: how much larger actions move
-  // Of the points on the surface, dm: distances from it, and between the template point that the field has there and
-  // the wanted one.
+  // For the points on the surface, in dm: distances from the surface, and residuals between the field's template point
+  // there and the wanted one.
   double mean_distance = 0, max_distance = 0, mean_residual = 0, max_residual = 0;
   size_t flipped = 0;  // triangles between such points that face away from where they do on the template
 };

@@ -1,5 +1,5 @@
-// What a photo's exposure, white balance and light make of a surface's colours: fitted where the photo sees the
-// surface, applied where it does not.
+// The effect of a photo's exposure, white balance and light on a surface's colours: fitted where the photo shows the
+// surface, applied elsewhere.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace maq::head {
 
-// Of one colour channel, 0 to 255: gain * own + offset + own * dot(directed, normal), a Lambertian surface in uniform
+// One colour channel, 0 to 255: gain * own + offset + own * dot(directed, normal), a Lambertian surface in uniform
 // light and light from one side.
 struct ChannelLight {
   double gain = 1, offset = 0;
@@ -18,8 +18,8 @@ struct ChannelLight {
   float operator()(float own, const float* normal) const;  // within 0 to 255
   double strength(const float* normal) const;              // what own colours are multiplied by
 
-  // What the light would make of a colour that it made `seen` of, were it everywhere of this strength; within 0 to 255.
-  // Where hardly any light falls its share of the colour is not known: there it counts as a quarter of `even`.
+  // The colour `seen` if the light had this strength everywhere; within 0 to 255. Where hardly any light falls, the
+  // strength is unknown and counts as a quarter of `even`.
   float evened(float seen, const float* normal, double even) const;
 };
 

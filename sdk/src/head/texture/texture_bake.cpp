@@ -22,8 +22,8 @@ constexpr double kFirstMatte = 0.6, kWholeMatte = 0.95;
 // A surface is hidden when another is before it by more: decimetres.
 constexpr double kHiddenBehind_dm = 0.06;
 constexpr int kMargin_px = 2;  // of a photo's square
-// What photos differ by fades with the distance from what they see: to 1 / e over this share of the texture's side.
-// Found on validation heads: new views are best at 0.4 to 1.
+// Differences of photos fade with the distance from the visible part: to 1 / e over this fraction of the texture's
+// side. Found on validation heads: new views are best at 0.4 to 1.
 constexpr double kFadeFraction = 0.4;
 
 double smooth_step(double value, double first, double whole) {
@@ -31,7 +31,7 @@ double smooth_step(double value, double first, double whole) {
   return t * t * (3 - 2 * t);
 }
 
-// What each texel shows; row by row.
+// The surface of each texel; row by row.
 struct Texels {
   std::vector<float> positions, normals, colours;  // [side][side][3]
   std::vector<uint8_t> is_surface, is_cap;         // [side][side]
@@ -153,7 +153,7 @@ double seen_fraction(const RenderedImage& depths, double x, double y, double dep
   return smooth_step(seen / 25.0, 0.8, 1);
 }
 
-// What one photo says. Its weight is a confidence, 0 to 1.
+// The differences of one photo. Its weight is a confidence, 0 to 1.
 Differences differences_of(const TexturePhoto& photo, const HeadMesh& mesh, const Texels& texels, int side,
                            WorkerThreads& threads) {
   const HeadCamera& camera = photo.camera;
@@ -264,7 +264,7 @@ PhotoLight match_light(Texels& texels, Differences& seen) {
   return light;
 }
 
-// Of each channel, the light's mean strength on what the photos see.
+// For each channel, the mean strength of the light on the part that the photos show.
 std::array<double, 3> mean_strength(const PhotoLight& light, const Texels& texels, const std::vector<float>& weights) {
   std::array<double, 3> sums{};
   double total = 0;

@@ -33,7 +33,7 @@ class LensProjection {
   // from the axis than the widest angle of undistorted images, or than where the distortion stops growing.
   std::optional<PixelPosition> find(double x, double y) const;
 
-  // Likewise for the directions (x[i], y, 1) of a row of pixels, to the bit; NaN for nothing.
+  // The same for the directions (x[i], y, 1) of a row of pixels, with the same bits; NaN for nothing.
   void find_row(const std::vector<double>& x, double y, double* column_px, double* row_px) const;
 
  private:

@@ -31,7 +31,7 @@ void warp_to_rgb(const ImageView& photo, const PixelMap& to_source, int width_px
 // Rows [top, bottom) of `to`, so that several threads can share an image. `channels` is 1 or 3.
 void warp_bytes(const Raster<const uint8_t>& from, int channels, const PixelMap& to_source, const Raster<uint8_t>& to,
                 int top, int bottom);
-// Likewise, but of the nearest pixel: between two depths there need not be anything.
+// The same with the nearest pixel: there need not be a surface between two depths.
 void warp_depths(const Raster<const float>& from, const PixelMap& to_source, const Raster<float>& to, int top,
                  int bottom);
 

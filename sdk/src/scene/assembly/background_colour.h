@@ -1,4 +1,4 @@
-// What photos show where the cloud has no points.
+// The colour of the photos where the cloud has no points.
 #pragma once
 
 #include <array>

@@ -19,7 +19,7 @@ struct SceneBuildOptions {
   uint64_t max_points = 0;  // of larger clouds points are taken evenly; 0: all
   // Larger photos are shrunk; 0: none, and those over the networks' limit (SceneNetworks::kMaxPixels) are left out.
   int long_side_px = 640;
-  // Of captures:
+  // For captures:
   size_t max_views = 0;        // evenly from all that may be used; 0: all
   bool uses_held_out = false;  // photos that the capture keeps for comparisons
 };
@@ -45,8 +45,8 @@ class SceneBuilder {
   std::optional<size_t> add_view(const ImageView& image, const Lens& lens, const PinholeCamera& pose,
                                  const BuildProgress& progress = {});
 
-  // As DescriptorFitter has them: more photos can be added after finish(), and none were after finish_and_forget(),
-  // which takes less memory.
+  // Like DescriptorFitter's: more photos can be added after finish(). After finish_and_forget(), which takes less
+  // memory, the builder has no photos.
   Scene finish() { return packed(fitter_.finish()); }
   Scene finish_and_forget();
   void cancel() { fitter_.cancel(); }
@@ -70,9 +70,9 @@ struct BuiltScene {
   std::vector<Dropped> dropped;  // photos that could not be used, or see nothing
 };
 
-// Of all photos of a capture, one after the other. Returns nothing where `progress` cancelled. Throws
-// MAQ_ERROR_INVALID_ARGUMENT also where all photos are held out; MAQ_ERROR_UNREADABLE where none can be used or sees a
-// point; and what SceneBuilder throws.
+// Builds a scene from all photos of a capture, one after the other. Returns nothing if `progress` cancelled. Throws
+// MAQ_ERROR_INVALID_ARGUMENT also if all photos are held out, MAQ_ERROR_UNREADABLE if none can be used or sees a point,
+// and the errors of SceneBuilder.
 std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,
                                       const SceneBuildOptions& options, const BuildProgress& progress = {});
 

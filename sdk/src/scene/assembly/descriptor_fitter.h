@@ -23,8 +23,8 @@
 namespace maq {
 
 struct FittingOptions {
-  // Of a photo's sides, for finding which points it sees: below 1 a point occludes more of what is behind it. 1/16 to
-  // 1.
+  // Fraction of a photo's sides at which visible points are found, 1/16 to 1. Below 1, a point occludes more of the
+  // points behind it.
   double visibility_scale = 1;
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
   int threads = 2;  // for what is done point by point; the networks have their own
@@ -65,7 +65,7 @@ class DescriptorFitter {
   // The same in less memory: regressions are freed on the way. Afterwards the fitter is empty, as at first.
   FittedPoints finish_and_forget();
 
-  // Of the points that some photo saw, in the order of finish().
+  // Regressions of the points that some photo saw, in the order of finish().
   const RegressionStore& regressions() const { return regressions_; }
 
   size_t views() const { return views_; }
@@ -90,7 +90,7 @@ class DescriptorFitter {
   size_t views_ = 0;
   std::atomic<bool> is_cancelled_{false};
   FittingTimes times_;
-  // Of one photo, kept for the next.
+  // Memory for one photo, kept for the next.
   ZBuffer visible_;
   std::vector<uint32_t> seen_;
   std::vector<float> aligned_photo_;

@@ -68,7 +68,7 @@ DescriptorKind solve_descriptor(const DescriptorRegression& regression, double a
     for (int c = 0; c < kFeatures; ++c) rotated[i][c] = regression.rotated[i][c];
   }
 
-  // What the centred values leave out, and the regulariser, as rows whose features are 0.
+  // The part that the centred values leave out, and the regulariser, as rows with features of 0.
   for (int extra = -1; extra < kBasis; ++extra) {
     double row[kBasis] = {}, features[kFeatures] = {};
     if (extra >= 0) {

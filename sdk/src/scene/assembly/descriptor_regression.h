@@ -17,7 +17,7 @@
 
 namespace maq {
 
-// Of one point; all zero before the first view.
+// The regression of one point; all zero before the first view.
 struct DescriptorRegression {
   uint32_t views;
   float mean_y[kFeatures];

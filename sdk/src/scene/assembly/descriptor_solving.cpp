@@ -7,7 +7,7 @@
 namespace maq {
 namespace {
 
-// Of the ridge regression; NPBG++ (arXiv 2203.13318) has the same.
+// Weight of the ridge regression, as in NPBG++ (arXiv 2203.13318).
 constexpr double kAlpha = 1;
 
 struct Solved {

@@ -21,7 +21,7 @@ struct CaptureView {
   PinholeCamera camera;     // of the photo after undistortion
   bool is_held_out;         // kept to compare with: no scene is made of it
   std::string depth_path;   // of the depth image of the same view; "" without one
-  double depth_unit_m = 0;  // as PosedPhoto has it
+  double depth_unit_m = 0;  // like PosedPhoto::depth_unit_m
 };
 
 struct Capture {

@@ -1,5 +1,4 @@
-// What the three files of a COLMAP model hold, unchecked: as text or binary
-// (https://colmap.github.io/format.html).
+// The unchecked content of the three files of a COLMAP model, as text or binary (https://colmap.github.io/format.html).
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What an import dropped, and why.
+// The dropped parts of an import, with reasons.
 #pragma once
 
 #include <cstddef>

@@ -28,9 +28,9 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
   uint64_t header_line = 0;
 
-  // What one of them takes in the file at least: lists may be empty; in text, a digit and a space for each property.
+  // Minimum bytes of one element in the file: lists may be empty; in text, a digit and a space for each property.
   uint64_t min_bytes(PlyForm form) const;
-  // Of the property of that name that is not a list; -1 when there is none.
+  // Index of the property of that name that is not a list; -1 if there is none.
   int index_of(const std::string& property) const;
 };
 

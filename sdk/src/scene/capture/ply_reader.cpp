@@ -90,7 +90,7 @@ void skip_element(const PlyElement& element, PlyForm form, PlyNumbers& numbers, 
   }
 }
 
-// What each property of a vertex is for: 0 to 2: x, y, z; 3 to 5: red, green, blue; -1: nothing.
+// The use of each property of a vertex: 0 to 2: x, y, z; 3 to 5: red, green, blue; -1: none.
 std::vector<int> uses_of(const PlyElement& vertex, const FileReader& file) {
   std::vector<int> uses(vertex.properties.size(), -1);
   const char* const positions[] = {"x", "y", "z"};
@@ -111,7 +111,7 @@ std::vector<int> uses_of(const PlyElement& vertex, const FileReader& file) {
   return uses;
 }
 
-// What a colour of that type, a whole number, is multiplied by to be 0 to 255.
+// The factor that converts a colour of that integer type to 0 to 255.
 double colour_scale(PlyType type) {
   switch (type) {
     case PlyType::kInt8: return 255.0 / 127;

@@ -13,7 +13,7 @@ struct PosedPhoto {
   Lens lens;
   std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row by row: world to camera, in axes of OpenCV
   std::array<double, 3> centre = {0, 0, 0};
-  std::string depth_name;    // of its depth image, likewise; "" without one
+  std::string depth_name;    // of its depth image, in the same folder; "" without one
   double depth_unit_m = 0;   // units of the scene of a stored 1 in it; 0: as the kind of file has it
   bool is_held_out = false;  // kept to compare with: no scene is made of it
 };

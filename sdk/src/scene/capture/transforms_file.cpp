@@ -21,7 +21,7 @@ constexpr uint64_t kMaxBytes = 16 << 20;
 
 constexpr double kLargestDepthUnit = 1e6;
 
-// What is said of a frame: by itself, or by the file for all.
+// The values for a frame: its own, or the file's for all frames.
 class Facts {
  public:
   Facts(const json& frame, const json& shared, std::string where)
@@ -110,14 +110,14 @@ void read_distortion(const Facts& facts, Lens& lens) {
   if (std::any_of(k.begin(), k.end(), [](double value) { return value != 0; })) lens.distortion = Distortion::kRational;
 }
 
-// Of the camera, where width and height are known.
+// Reads the camera, once width and height are known.
 void read_intrinsics(const Facts& facts, Lens& lens) {
   const auto from_angle = [&](const char* key, int side_px) -> std::optional<double> {
     const auto angle = facts.number(key);
     if (!angle) return {};
     return 0.5 * side_px / std::tan(0.5 * *angle);
   };
-  // What is said in pixels is exact; angles are for files without it.
+  // Values in pixels are exact; angles are for files without them.
   auto across = facts.number("fl_x"), down = facts.number("fl_y");
   if (!across && !down) {
     across = from_angle("camera_angle_x", lens.width_px);

@@ -11,7 +11,7 @@ namespace maq {
 
 struct TransformsFile {
   std::vector<PosedPhoto> photos;  // names relative to the file's folder
-  std::string cloud;               // "ply_file_path", likewise; "" when the file names none
+  std::string cloud;               // "ply_file_path", relative too; "" if the file names none
 };
 
 // `folder`/`file_name`. For each frame `transform_matrix` is camera to world with axes of OpenGL (x right, y up, z

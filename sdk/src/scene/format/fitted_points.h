@@ -1,4 +1,4 @@
-// What is left of a cloud once its descriptors are fitted: the points that some photo saw.
+// The points of a cloud that some photo saw, after their descriptors are fitted.
 #pragma once
 
 #include <array>

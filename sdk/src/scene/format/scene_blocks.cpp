@@ -30,7 +30,7 @@ class BlockSplitter {
   }
 
  private:
-  // Of points at the same position the first comes first, so that every standard library splits them alike.
+  // Points at the same position keep their order. Every standard library then splits them alike.
   struct LessAlongAxis {
     int axis;
     bool operator()(const Entry& a, const Entry& b) const {

@@ -135,7 +135,7 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
     fail(" has ", size_bytes, " bytes, but should have ", head_.file_bytes,
          ": it is truncated or damaged; copy it again.");
   }
-  // What follows only fails for files made to do harm, or by a defective writer.
+  // The checks below fail only for malicious files, or for a defective writer.
   const bool has_kinds = head_.position_format <= uint8_t(PositionFormat::kUint16) &&
                          head_.coefficient_format <= uint8_t(CoefficientFormat::kInt8) &&
                          are_zero(head_.zero, sizeof head_.zero) && are_zero(head_.more_zeros, sizeof head_.more_zeros);
@@ -182,7 +182,7 @@ std::shared_ptr<const uint8_t> SceneFileReader::map() const {
           [bytes](const uint8_t* from) { ::munmap(const_cast<uint8_t*>(from), bytes); }};
 }
 
-// What the renderer relies on: blocks follow each other without gaps, and decoded numbers are finite.
+// Checks what the renderer relies on: blocks follow each other without gaps, and decoded numbers are finite.
 void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& blocks) {
   const SceneFileHead& head = file.head();
   const double max_constant = head.coefficient_format == uint8_t(CoefficientFormat::kInt8)    ? 128

@@ -10,7 +10,7 @@ namespace maq {
 namespace {
 
 constexpr size_t kRefinersKept = 3;
-// Of the basis: what comes out stays a float when it is squared.
+// Limit of the basis: its output stays a finite float when it is squared.
 constexpr float kLargestWeight = 1000;
 constexpr int kMaxLevels = 5, kSpaceToDepthPixels = 4, kColours = 3;
 

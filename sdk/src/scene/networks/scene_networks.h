@@ -21,7 +21,7 @@ struct RefinerLayout {
   // 2x2 are one, all channels of one before those of the next.
   bool is_space_to_depth = false;
 
-  // Of what a picture of that size (sides multiples of kMultiple) is made of, and of the picture.
+  // Shapes of the rasters of an image of that size (sides multiples of kMultiple), and of the image.
   Shape raster_shape(int level, int width_px, int height_px) const;
   Shape picture_shape(int width_px, int height_px) const;
 };
@@ -31,7 +31,8 @@ class SceneNetworks {
   static constexpr int kPhotoMultiple = 32;    // of the sides of photos
   static constexpr int kPictureMultiple = 16;  // of the sides of pictures that are rendered
   static constexpr int kRasterChannels = kFeatures + 1;
-  // Of a photo, or a picture that is rendered. A photo takes some 400 bytes a pixel while the extractor works on it.
+  // Maximum pixels of a photo or a rendered image. A photo takes some 400 bytes a pixel while the extractor works on
+  // it.
   static constexpr int64_t kMaxPixels = int64_t(1) << 23;
 
   // Networks are made when they are needed first, the refiner for each size that it is needed for. Throws
@@ -44,7 +45,7 @@ class SceneNetworks {
   const std::string& name() const { return bundle_.manifest.name; }
   const ViewBasis& basis() const { return basis_; }
   const RefinerLayout& refiner_layout() const { return layout_; }
-  // Of the three networks' files: SHA-256 of their SHA-256 digests, extractor, refiner, basis.
+  // SHA-256 of the SHA-256 digests of the three networks' files: extractor, refiner, basis.
   const std::array<uint8_t, 32>& sha256() const { return sha256_; }
 
   // Throws what extract() throws for a photo of that size.

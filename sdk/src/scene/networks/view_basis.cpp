@@ -43,7 +43,7 @@ MAQ_SIMD_CLONES void evaluate_block(const float* weights, const float* const dir
     for (size_t i = 0; i < kBlock; ++i) {
       float sine, cosine;
       sine_and_cosine(directions[axis][i], sine, cosine);
-      // Of twice the angle, and of twice that.
+      // Sine and cosine of twice the angle, then of four times the angle.
       for (int frequency = 0; frequency < 3; ++frequency) {
         encoded[size_t(6 * frequency + axis) * kBlock + i] = sine;
         encoded[size_t(6 * frequency + 3 + axis) * kBlock + i] = cosine;

@@ -9,8 +9,8 @@
 
 namespace maq {
 
-// Weights as torch has them, [out][in]: 18-16-16-6, leaky ReLU (0.01) in between. What goes in are, for pi/2, pi and
-// 2 pi times the direction, the sines of x, y, z and the cosines of x, y, z.
+// Weights in torch's order, [out][in]: 18-16-16-6, leaky ReLU (0.01) in between. The inputs are the sines of x, y, z
+// and the cosines of x, y, z, for pi/2, pi and 2 pi times the direction.
 class ViewBasis {
  public:
   static constexpr int kEncoded = 18, kHidden = 16;
@@ -20,7 +20,7 @@ class ViewBasis {
   // `weights`: weight and bias of each layer, one after the other; kWeights values.
   explicit ViewBasis(const std::vector<float>& weights) : weights_(weights) {}
 
-  // Of `count` unit vectors, one array for each coordinate; values [kBasis][count].
+  // Evaluates `count` unit vectors, one array for each coordinate; values [kBasis][count].
   void evaluate(const float* x, const float* y, const float* z, size_t count, float* values) const;
 
  private:

@@ -12,7 +12,7 @@ namespace maq {
 
 class Coverage {
  public:
-  // Of the raster's window, which has that size.
+  // Finds the coverage of the raster's window, which has that size.
   void find(const DescriptorRaster& raster, int width_px, int height_px, WorkerThreads& threads);
 
   // Confidence that a pixel shows the scene, 0..255, row by row: 255 where there is a point in the 4x4 pixels (2x2, 1)

@@ -61,7 +61,7 @@ void DescriptorRaster::shade(const View& view, WorkerThreads& threads) {
 void DescriptorRaster::shade_strip(const View& view, int top, Scratch& scratch) {
   const Scene& scene = view.scene;
   const size_t width = size_t(view.window.width_px);
-  // Of pixels that are neighbours in a row: side by side, or two of a cell of four.
+  // Distance between pixels that are neighbours in a row: side by side, or two of a cell of four.
   const bool is_space_to_depth = view.layout.is_space_to_depth;
   const size_t cell = is_space_to_depth ? 4 * kChannels : 2 * kChannels;
   scratch.constant.clear();
@@ -129,7 +129,7 @@ void DescriptorRaster::reduce_strip(const View& view, int top) {
         const size_t of_first = four[1] < four[0] ? 1 : 0, of_last = four[3] < four[2] ? 3 : 2;
         const size_t best = four[of_last] < four[of_first] ? of_last : of_first;
         keys[x] = four[best];
-        // Of four without a point the first is all 0.
+        // If none of the four has a point, the first is all 0.
         std::memcpy(to + x * kChannels, from + x * cell + offsets[best], kChannels * sizeof(float));
       }
     }
@@ -138,7 +138,7 @@ void DescriptorRaster::reduce_strip(const View& view, int top) {
 
 void DescriptorRaster::fill_strip(const View& view, int top) {
   const size_t width = size_t(view.window.width_px);
-  // Of all scales, whichever the refiner reads: a hole has the colour of the finest that has a point there.
+  // Uses all scales, whichever the refiner reads: a hole has the colour of the finest scale with a point there.
   constexpr int last = kLevels - 1;
   for (int level = last; level >= 0; --level) {
     const size_t columns = width >> level;

@@ -31,7 +31,7 @@ class DescriptorRaster {
   static constexpr int kMultiple = 1 << (kLevels - 1);
   static constexpr int kChannels = SceneNetworks::kRasterChannels;  // the last is 1 where there is a point
 
-  // What is shaded, and for which refiner. All must outlive the call.
+  // The points to shade, and the refiner's layout. All must outlive the call.
   struct View {
     const Scene& scene;
     const BlockIndex& blocks;  // of the scene

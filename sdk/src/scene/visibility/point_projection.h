@@ -20,7 +20,7 @@ struct PointSpan {
   uint32_t first = 0;  // index of the first point
   double base[3] = {0, 0, 0}, step[3] = {1, 1, 1};
 
-  // Of point i from the camera's centre. The sum is made in double: scenes may lie far from the origin of the world.
+  // Vector from the camera's centre to point i. The sum is in double: scenes may lie far from the origin of the world.
   template <class Stored>
   void offset(uint32_t i, float away[3]) const {
     const void* const from[3] = {x, y, z};

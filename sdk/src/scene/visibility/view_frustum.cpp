@@ -5,7 +5,7 @@
 namespace maq {
 namespace {
 
-// Of a float's arithmetic with a few terms, and a pixel around the picture.
+// Rounding of float arithmetic with a few terms, and a margin of one pixel around the image.
 constexpr double kRounding = 1e-6, kMargin_px = 1;
 
 }  // namespace

@@ -43,9 +43,9 @@ class ZBuffer {
 
   // A side of the blocks that remove_occluded() works on, pixels.
   static constexpr int kOcclusionBlockPx = 4;
-  // Of what is finished in rows [top, bottom), removes points that bleed through holes of a nearer surface: those
-  // farther than the nearest of their block, counted from the first pixel, by over that fraction of its depth. `top` is
-  // a multiple of kOcclusionBlockPx, `bottom` too or the height. Different rows may be worked on at once.
+  // In finished rows [top, bottom), removes points that bleed through holes of a nearer surface. These are farther than
+  // the nearest point of their block (counted from the first pixel) by over that fraction of its depth. `top` is a
+  // multiple of kOcclusionBlockPx, `bottom` too or the height. Different rows may be processed at once.
   void remove_occluded(int top, int bottom, double depth_tolerance);
 
   int width_px() const { return width_px_; }

@@ -26,7 +26,7 @@ class Preview : public ::testing::Test {
     EXPECT_EQ(fake_.misuse(), "");
   }
 
-  // Of a picture whose pixels differ from their neighbours.
+  // Pixels that differ from their neighbours.
   static std::vector<uint8_t> pixels() {
     std::vector<uint8_t> rgb(size_t(kWidth) * kHeight * 3);
     for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = uint8_t(i % 251 / 8 + i / 960 % 7);
@@ -52,7 +52,7 @@ class Preview : public ::testing::Test {
   }
   bool draw(const PreviewStyle& style = {}) { return preview_.draw(frame_.get(), result_.get(), style); }
 
-  // What the C API draws of a part of the frame.
+  // The C API's drawing of a part of the frame.
   std::vector<uint32_t> drawn(int x, int y, int width, int height, const PreviewStyle& style) {
     maq_densepose_drawing drawing;
     maq_densepose_drawing_init(&drawing, sizeof drawing);

@@ -1,4 +1,4 @@
-// What the C API does with wrong arguments: a status and a sentence, never a crash.
+// The C API returns a status and a sentence for wrong arguments. It never crashes.
 #include <gtest/gtest.h>
 #include <maquette/maquette.h>
 

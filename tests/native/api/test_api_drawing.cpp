@@ -22,7 +22,7 @@ class ApiDrawing : public ::testing::Test {
     return drawing_.opacity == 0 ? 180 : drawing_.opacity == MAQ_DENSEPOSE_INVISIBLE ? 0 : drawing_.opacity;
   }
 
-  // What is to be drawn at a pixel of the frame, by its definition.
+  // The expected colour at a pixel of the frame, by definition.
   std::vector<uint8_t> expected(int x, int y, bool has_frame) const {
     size_t stride = 0;
     const uint8_t part = result_.plane(MAQ_DENSEPOSE_PLANE_PART, &stride)[size_t(y) * stride + size_t(x)];

@@ -300,7 +300,7 @@ TEST_F(ApiEdgeCurves, AreBoundedReusedAndOutliveTheResult) {
     EXPECT_EQ(maq_edges_curves_get_curve(released, 0, &curve), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_NE(std::strstr(maq_last_error(nullptr), "a maq_edges_curves that was given back before"), nullptr)
         << maq_last_error(nullptr);
-    // Those that were refused go back.
+    // Refused curves go back to the pool.
     maq_edges_curves_config config = maquette::default_edges_curves_config();
     config.min_votes = -1;
     for (int i = 0; i < 5; ++i) {

@@ -22,8 +22,7 @@ double distance_m(const maquette::Head& head, const char* from, const char* to) 
   return std::hypot(a.point_m[0] - b.point_m[0], a.point_m[1] - b.point_m[1], a.point_m[2] - b.point_m[2]);
 }
 
-// What a depth camera would see of the head from where the photo was taken, were the head `larger` than it is; the
-// background is at 5 m.
+// Depth of the head from the photo's camera, if the head were `larger`; the background is at 5 m.
 std::vector<float> depth_of_photo(const maquette::Context& context, const maquette::Head& head, float larger) {
   maq_head_renderer_config config = maquette::default_head_renderer_config();
   maquette::HeadRenderer renderer(context, config, maquette::HeadMesh(head, coarse));

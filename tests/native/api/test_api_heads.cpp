@@ -42,8 +42,8 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndLandmarks) {
   EXPECT_NEAR(info.scale_sigma, 0.07 / std::sqrt(3.0), 0.005) << "three axes that differ by 7 %";
   EXPECT_EQ(head.landmark_names(),
             (std::vector<std::string>{"nose_tip", "chin", "crown", "pupil_left", "pupil_right"}));
-  // Of the prior's mean the pupils are 63.7 mm apart and the crown is at 121 mm. The encoder saw a head that is
-  // narrower by 1.105 and taller by 1 / 0.895; how large it is no photo tells.
+  // On the prior's mean the pupils are 63.7 mm apart and the crown is at 121 mm. The encoder saw a head that is
+  // narrower by 1.105 and taller by 1 / 0.895; no photo tells its size.
   const maq_head_landmark crown = head.landmark("crown"), left = head.landmark("pupil_left");
   EXPECT_NEAR(2 * left.point_m[0] / crown.point_m[2], 63.7 / 121 * 0.895 / 1.105, 0.015);
   // By the anchors it is 1 mm, and the photo leaves more of the depth than of the height (export.heads.fit says as

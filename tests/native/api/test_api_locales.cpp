@@ -39,7 +39,7 @@ class ApiLocales : public ::testing::Test {
     std::setlocale(LC_NUMERIC, "C");
   }
 
-  // Of C++ and, where there is one, of C.
+  // In C++ and, if available, in C.
   void write_numbers_with_commas() {
     std::locale::global(std::locale(std::locale::classic(), new Comma));
     std::ostringstream text;

@@ -263,7 +263,7 @@ class LoneCopy {
     body(source);
     function<decltype(maq_source_destroy)>("maq_source_destroy")(source);
   }
-  // Of the DepthAI devices in the list of cameras.
+  // Statuses of the DepthAI devices in the list of cameras.
   std::vector<maq_status> depthai_listings() {
     maq_camera_list* list = nullptr;
     EXPECT_EQ(function<decltype(maq_camera_list_create)>("maq_camera_list_create")(context_, &list), MAQ_OK);

@@ -1,4 +1,4 @@
-// What a child of fork() may do with the objects of its parent: nothing, and it is told so.
+// A child of fork() can do nothing with the objects of its parent, and gets an error that says so.
 #include <gtest/gtest.h>
 
 #include <maquette/maquette.hpp>

@@ -1,5 +1,5 @@
-// What happens where the system starts fewer threads than asked for (ulimit -u, limits of containers). A program of its
-// own, since it takes the place of pthread_create: root's threads have no limit.
+// The library works when the system starts fewer threads than requested (ulimit -u, limits of containers). It is its
+// own program because it replaces pthread_create: root's threads have no limit.
 #include <dlfcn.h>
 #include <sys/resource.h>
 

@@ -23,7 +23,7 @@ maquette::LiveOptions as_fast_as_it_goes(uint64_t max_results) {
   return options;
 }
 
-// What came from the pipeline, and what waits until something holds.
+// Collects the pipeline's output and waits until a condition holds.
 class Live {
  public:
   explicit Live(const maquette::LiveOptions& options = {}, const std::string& bundle = kTinyBundle)

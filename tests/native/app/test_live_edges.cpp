@@ -14,7 +14,7 @@ struct SeenEdges {
   size_t curves = 0, boxes = 0;
 };
 
-// What came from the pipeline.
+// Collects the pipeline's output.
 class EdgesRun {
  public:
   explicit EdgesRun(const maquette::LiveEdgesOptions& model = shipped(), uint64_t max_results = 0)

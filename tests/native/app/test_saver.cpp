@@ -19,7 +19,7 @@ maquette::RgbaImage image(int width, int height, uint8_t grey) {
 
 class Saver : public ::testing::Test {
  protected:
-  // What was written, after all jobs.
+  // Returns the written files, after all jobs.
   std::vector<std::string> finished() {
     saver_.reset();
     std::vector<std::string> paths;

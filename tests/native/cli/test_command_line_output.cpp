@@ -1,4 +1,4 @@
-// What the `maquette` program writes, and where: output that is lost is told, and names of files do nothing.
+// The `maquette` program reports lost output, and names of files cannot control the terminal.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What Ctrl-C, a closed terminal and a supervisor do to the program while it waits for frames that do not come.
+// Ctrl-C, a closed terminal and a supervisor end the program while it waits for frames that do not come.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -32,7 +32,7 @@ class SceneCommandLine : public ::testing::Test {
     EXPECT_EQ(result.err.find('\n', last), result.err.size() - 1) << result.err;
   }
 
-  // What is there, hidden files too: nothing may be left half made.
+  // Lists all files, hidden ones too: nothing may be left half made.
   std::set<std::string> files(const std::string& folder = "") const {
     std::set<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(file(folder))) {

@@ -96,7 +96,7 @@ void make_everybody_part(Logits& logits, int part) {
   logits.fill(logits.index, part, 5);
 }
 
-// Of 16 x 16 cells, about half of them background.
+// Logits of 16 x 16 cells, about half of them background.
 Logits random_logits(std::mt19937& random) {
   std::uniform_real_distribution<float> logit(-4, 4), coordinate(-0.2f, 1.2f);
   Logits logits(16);
@@ -200,7 +200,7 @@ TEST(DenseDecode, ARotatedPersonIsPaintedAsTheReference) {
   EXPECT_EQ(counts.body_pixels, body);
   EXPECT_GT(body, 500);
   EXPECT_GT(outside, 500);
-  // Those in front stay, and who is mostly hidden leaves no trace.
+  // People in front stay, and a person who is mostly hidden leaves no trace.
   const DensePlanes before = planes;
   EXPECT_EQ(paint_rotated_person(logits.view(&charts), to_cells, 7, 0.5f, 0.5f, memory, planes).body_pixels, 0);
   EXPECT_EQ(planes.person, before.person);

@@ -119,7 +119,7 @@ TEST(PersonCrop, ALeaningPersonStandsUprightInTheMiddleOfTheCrop) {
   }
 }
 
-// Of a crop that is not rotated.
+// The box of a crop that is not rotated.
 Box box_in_image(const maq::PersonCrop& crop) {
   const Point low = crop.to_image({crop.box.x0, crop.box.y0}), high = crop.to_image({crop.box.x1, crop.box.y1});
   return {float(low.x), float(low.y), float(high.x), float(high.y)};

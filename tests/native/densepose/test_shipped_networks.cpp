@@ -237,8 +237,8 @@ cv::Mat ShippedNetworks::photo_;
 // that follow make more of it. Measured on an AVX-512 machine: 0.034 for the trunk, whose first blocks are float and
 // whose fifty layers pass it on; 0 for the RPN and the heads.
 constexpr double kMaxOptimisingErrorTrunk = 0.05, kMaxOptimisingError = 0.01;
-// Of the evidence of people, logits, root mean square over its cells: 0.2 to 0.4 on six photos. A box counts their
-// mean.
+// Maximum error of the person-logit map. Its root mean square over the cells is 0.2 to 0.4 on six photos. A box counts
+// the mean of its cells.
 constexpr double kMaxEvidenceError = 0.5;
 
 TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {
@@ -343,7 +343,7 @@ struct RotatedPhoto {
   cv::Mat into;  // from the photo
 };
 
-// Of the photo's pixels that show a body in either result, those that show the same part in both.
+// Fraction of the pixels with the same part in both results, among pixels that show a body in either result.
 double same_parts(const maq::DensePoseResult& upright, const maq::DensePoseResult& rotated, const cv::Mat& into) {
   const auto plane = [](const maq::DensePoseResult& result) {
     return cv::Mat(result.planes.height_px, result.planes.width_px, CV_8U,

@@ -32,7 +32,7 @@ SeenScene seen_at(SolidScene scene, bool is_large = false) {
 
 double degrees(double rad) { return rad * 180 / kPi; }
 
-// Of the lines of at least 30 r that lie along a straight edge of the scene: how far they are from it.
+// Distance of lines of at least 30 r from the straight edge of the scene that they lie along.
 struct LineErrors {
   int lines = 0;
   double angle_deg = 0, offset_r = 0;  // the worst

@@ -46,7 +46,7 @@ def networks_of_the_bundle() -> Networks:
 
 
 def model() -> FittedPoints:
-    """Of `looks.bin`, as make_tiny_scene.py describes it."""
+    """Reads `looks.bin`, which make_tiny_scene.py describes."""
     numbers = FEATURES + BASIS * FEATURES + 1
     row = np.dtype([("index", "<u4"), ("views", "<u4"), ("look", "<f4", numbers)])
     table = np.fromfile(SCENE / "looks.bin", row)

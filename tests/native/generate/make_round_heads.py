@@ -35,7 +35,7 @@ CELLS = CROP_PX // CELL_PX
 SHAPE = FieldShape(
     octaves=0, width=26, geometry_layers=1, feature=3, surface_width=10, surface_layers=1, personal_geometry_layers=1
 )
-# Of each pair of opposite points of a cube's 26 (faces, edges, corners) one; the axes come first.
+# One of each pair of opposite points of a cube's 26 (faces, edges, corners); the axes come first.
 _HALF = [np.array(d) for d in product((-1, 0, 1), repeat=3) if d > (0, 0, 0)]
 DIRECTIONS = np.array([d / np.linalg.norm(d) for d in sorted(_HALF, key=lambda d: (np.abs(d).sum(), -d @ (4, 2, 1)))])
 SHARE = 2 / len(DIRECTIONS)  # so that the norm is the length, nearly
@@ -110,7 +110,7 @@ def on_template(directions: np.ndarray) -> np.ndarray:
 
 
 def cells(mirrored: bool) -> np.ndarray:
-    """What the encoder says, [CELLS, CELLS, 8]."""
+    """Returns the encoder's output, [CELLS, CELLS, 8]."""
     turn = np.array([[np.cos(TURN_RAD), -np.sin(TURN_RAD), 0], [np.sin(TURN_RAD), np.cos(TURN_RAD), 0], [0, 0, 1]])
     rotation = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]) @ turn  # to the camera
     focal_px = CROP_PX * DISTANCE_DM / (CROP_SIDES * 2 * RADII_DM[2])

@@ -3,7 +3,7 @@ says of codes.
 
 `bundle`, and `rows_in_bytes.maqr`: its rows as bytes. `foreseen.f32`: little-endian [5][256][2], bits of each code of
 frames 1 to 5 of data/tiny_prediction given those before them, at 10 frames a second. `stream.f32`: [5][256], bits of a
-code as surprise has them from these, mean of the place. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
+code by the novelty score, mean of the cell. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
 likeliest given those before it. `mended.f32`: [64][64][3], the refined prediction 0.4 s after frame 2 from frames 0
 to 2 and frame 3 as the extrapolated frame.
 

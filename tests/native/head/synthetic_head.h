@@ -127,7 +127,7 @@ inline FieldWeights train_mean_head() {
   return weights;
 }
 
-// What a code adds to the stretch S of a head: a point p of it lies on the mean head at S p.
+// The change of a head's stretch S for one code: a point p of the head lies on the mean head at S p.
 inline void add_stretch(int code, double s[3][3], double amount) {
   if (code < 3) {
     s[code][code] += 0.07 * amount;
@@ -287,7 +287,7 @@ inline void rays_of(const HeadCamera& camera, const std::vector<maq::Point>& pix
   }
 }
 
-// What an encoder would say of the head with these codes, with noise, and the crop's pixels. The crop shows `crop_dm`.
+// An encoder's output for the head with these codes, with noise, and the crop's pixels. The crop shows `crop_dm`.
 inline HeadPhoto photo_of(const FieldCodes& codes, const HeadCamera& camera, const Noise& noise = {}, double roll = 0.1,
                           double crop_dm = 4) {
   const FieldWeights weights = prior().bases.combine(codes);

@@ -162,7 +162,7 @@ TEST(AnchorFit, TheSameTwiceHasTheSameBits) {
 
 TEST(AnchorFit, CodesThatMoveNothingOrTheSameStayWithinThePrior) {
   const HeadPhoto photo = photo_for_anchors(camera_at(6, 900, 0.3), 5);
-  // Of rank 3: code 3 moves no anchor, or does what code 0 does.
+  // Rank 3: code 3 moves no anchor, or has the same effect as code 0.
   HeadPrior idle = prior(), doubled = prior();
   for (size_t row = 0; row < idle.anchors.linear.size(); row += 4) {
     idle.anchors.linear[row + 3] = 0;

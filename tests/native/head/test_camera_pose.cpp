@@ -140,7 +140,7 @@ TEST(CameraPose, CollinearPointsAndPointsInOnePlaceAreAStatus) {
     }
     EXPECT_EQ(find_camera_pose(points, known(camera)).status, PoseStatus::kCollinear);
     EXPECT_EQ(find_camera_pose(points, prior_of(camera, 1, 0.5)).status, PoseStatus::kCollinear);
-    // Those that could tell are wrong.
+    // The points that could decide are wrong.
     for (int i = 0; i < 6; ++i) {
       Correspondence wrong = seen(camera, random.direction(), 0, random);
       wrong.x_px = 640 * random.uniform(), wrong.y_px = 480 * random.uniform();

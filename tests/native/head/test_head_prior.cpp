@@ -1,4 +1,4 @@
-// What a prior of heads must be before it is used.
+// Conditions that a prior of heads must meet before it is used.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -40,7 +40,7 @@ TEST(RigidMotions, TheExponentialMapIsItsSeriesAtEveryAngle) {
   for (const double angle : kAngles) {
     const Mat3 r = maq::head::exp_rotation(angle * kAxis), reference = exp_by_series(angle * kAxis);
     for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(r[i], reference[i], 1e-15) << angle;
-    // What differs from the identity is accurate too.
+    // The difference from the identity is accurate too.
     if (angle > 0 && angle < 0.1) {
       EXPECT_NEAR(r[7] / (angle * kAxis.x), 1, 2 * angle) << angle;
     }

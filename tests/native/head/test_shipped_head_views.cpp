@@ -67,7 +67,7 @@ TEST_F(ShippedHeadViews, FromEverySideThereIsAHeadThatStaysAHeadOrAStatus) {
     }
     if (!made) continue;
     expect_sound(*made);
-    // What is not seen is as the prior has it: no code runs away.
+    // Unseen parts follow the prior: no code runs away.
     for (const float code : made->head.codes.shape) EXPECT_LT(std::abs(code), 4) << name;
   }
 }

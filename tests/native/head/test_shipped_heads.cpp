@@ -1,4 +1,4 @@
-// What the shipped encoder and prior make of photos as people take them, and of what is no head at all.
+// The shipped encoder and prior on everyday photos, and on images that show no head.
 #include <gtest/gtest.h>
 
 #include <cmath>

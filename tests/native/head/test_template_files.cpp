@@ -64,7 +64,7 @@ TEST(TemplateFiles, ThatLieAreRefusedThoughTheirChecksAreRight) {
     expect_error(status, text, [&] { read_template(bytes.data(), bytes.size(), "template.maqt"); });
   };
   constexpr maq_status kBad = MAQ_ERROR_BAD_BUNDLE;
-  // What follows the head: 5 points, their kinds, 6 vertices, their coordinates, 4 triangles, actions.
+  // After the head: 5 points, their kinds, 6 vertices, their coordinates, 4 triangles, actions.
   constexpr size_t kKinds = sizeof(TemplateFileHead) + 30, kVertices = kKinds + 5, kTriangles = kVertices + 12 + 24,
                    kActions = kTriangles + 24;
   refuse("is not a template", kBad, [](auto& head, auto&) { head.start.magic[5] = 'X'; });

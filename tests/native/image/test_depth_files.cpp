@@ -128,7 +128,7 @@ TEST_F(DepthFiles, AreWrittenInMillimetresOrInMetresAndReadBackEqual) {
   EXPECT_EQ(back[7], 0) << "the end of the range";
 }
 
-// Of a picture in the app's memory: padded rows at an odd address.
+// An image in the app's memory: padded rows at an odd address.
 TEST_F(DepthFiles, AreWrittenOfPaddedRows) {
   std::vector<uint8_t> memory(1 + 31 * 37, 0xEE);
   const cv::Mat image = ramp();

@@ -1,4 +1,4 @@
-// What is read of each format of images, compared with what OpenCV decodes.
+// Images of each format are read as OpenCV decodes them.
 #include <gtest/gtest.h>
 #include <turbojpeg.h>
 
@@ -111,7 +111,7 @@ TEST(ImageFormats, ImagesAreUprightByTheirExifOrientation) {
     for (const bool is_little : {true, false}) {
       const Bytes facts = exif(orientation, is_little);
       expect_as_opencv(with_exif(".jpg", jpeg, facts), "orientation " + std::to_string(orientation));
-      // OpenCV rotates no WebP image, but a JPEG image of the same size likewise.
+      // OpenCV rotates JPEG images, but no WebP images: a JPEG image of the same size is the reference.
       const maq::Frame upright = decoded(with_exif(".webp", webp, facts));
       const cv::Mat expected =
           cv::imdecode(with_exif(".jpg", encoded(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, 100}), facts), 1);

@@ -36,7 +36,7 @@ void expect_rays(const Lens& lens, const std::vector<Ray>& rays) {
   }
 }
 
-// What cv2.projectPoints of OpenCV 5.0.0 says of points (x, y, 1) for the lens above.
+// Results of cv2.projectPoints of OpenCV 5.0.0 for points (x, y, 1) and the lens above.
 TEST(Lenses, TheRationalModelIsThatOfOpenCv) {
   expect_rays(rational(), {{0, 0, 331.500000000000, 228.250000000000},
                            {0.1, -0.05, 383.289586538904, 203.452311926563},
@@ -46,7 +46,7 @@ TEST(Lenses, TheRationalModelIsThatOfOpenCv) {
                            {0.3, 0.5, 475.187861229817, 458.410668347592}});
 }
 
-// cv2.fisheye.projectPoints likewise.
+// Results of cv2.fisheye.projectPoints for the same points.
 TEST(Lenses, TheFisheyeModelIsThatOfOpenCv) {
   expect_rays(fisheye(), {{0, 0, 331.500000000000, 228.250000000000},
                           {0.1, -0.05, 383.304115876645, 203.443798359068},

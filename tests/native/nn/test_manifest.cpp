@@ -59,7 +59,7 @@ TEST(Manifest, AnErrorDoesNotQuoteAllOfAnEndlessValue) {
 
 // Each key in turn is taken away, then given a value of a wrong type.
 void expect_each_key_needed(const json& node, const json::json_pointer& at) {
-  // What a person reads, and what belongs to the task.
+  // Keys for readers, and keys of the task.
   const std::vector<std::string> free = {"licence", "training_data", "measured", "opset"};
   const std::vector<std::string> of_task = {"input", "rpn", "box_head", "dense_head", "charts"};
   for (const auto& [key, value] : node.items()) {

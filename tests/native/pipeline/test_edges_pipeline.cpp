@@ -38,7 +38,7 @@ class EdgesPipeline : public testing::Test {
     const maq_edges_curves_config curves = maquette::default_edges_curves_config();
     return maquette::EdgesModel(context, edges, with_curves ? &curves : nullptr);
   }
-  // What it says when it cannot go on.
+  // The pipeline's problem text when it fails.
   static std::string failure(maquette::Pipeline& pipeline, maq_status status) {
     try {
       while (pipeline.next(kLongEnoughNs)) {

@@ -27,7 +27,7 @@ void shade(DescriptorRaster& raster, size_t count, maq::WorkerThreads& threads) 
   raster.shade({scene, blocks, buffer, camera.centre, {0, 0, int(kWidth), int(kHeight)}, basis, layout}, threads);
 }
 
-// Of the pixel (x, y) at a level, in double.
+// Alpha of the pixel (x, y) at a level, in double.
 double alpha_at(const DescriptorRaster& raster, int level, int x, int y) {
   const double confidence[] = {255, 255, 255, 128, 64};
   const int width = int(kWidth) >> level, height = int(kHeight) >> level;

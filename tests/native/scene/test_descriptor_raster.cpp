@@ -89,7 +89,7 @@ struct View {
     const maq::BlockIndex blocks(scene);
     raster.shade({scene, blocks, buffer, camera.centre, window, basis(), layout}, workers);
   }
-  // Of a pixel of the window at a level.
+  // The descriptor of a pixel of the window at a level.
   const float* at(int level, size_t x, size_t y) const {
     const size_t width = size_t(window_.width_px) >> level;
     const size_t pixel =

@@ -21,7 +21,7 @@ class SceneBuilder : public testing::Test {
   }
 
   maq::BuiltScene built(const maq::Capture& capture) { return maq::build_scene(capture, networks_, options_).value(); }
-  // Of these views of the capture, held out or not.
+  // A scene of these views of the capture, held out or not.
   Scene built_of(const std::vector<size_t>& views) {
     maq::DescriptorFitter fitter(capture_.cloud, capture_.up, *networks_, options_.fitting);
     for (const size_t view : views) {

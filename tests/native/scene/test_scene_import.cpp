@@ -187,7 +187,7 @@ TEST_F(SceneImport, TransformsAreCamerasInAxesOfOpenGl) {
   EXPECT_EQ(texts_of(capture.dropped), "");
   const maq::PinholeCamera& camera = capture.views[2].camera;
   EXPECT_EQ(camera.centre, (std::array<double, 3>{1, 0, 0}));
-  // What is to the right of it (x), in front (y) and above (z) in the world, as the camera sees it: right, up, forward.
+  // A point to the right (x), in front (y) and above (z) in the world, as the camera sees it: right, up, forward.
   const double d[3] = {0.5, 4, 1};
   double seen[3] = {};
   for (size_t k = 0; k < 9; ++k) seen[k / 3] += camera.rotation[k] * d[k % 3];

@@ -158,7 +158,7 @@ TEST_F(SceneNetworks, GraphsOfAnotherInterfaceAreRefused) {
   refused("/basis/file", "weights.bin", "which \"files\" does not list");
 }
 
-// What only the graph itself tells is seen when it is used first.
+// A fault that only the graph itself shows is found when the graph is first used.
 TEST_F(SceneNetworks, AGraphThatIsNotTheManifestsIsSeenWhenItIsUsed) {
   replace("extractor.onnx", read_text(folder_.file("refiner.onnx")));
   const auto networks = open();

@@ -54,7 +54,7 @@ struct DescriptorError {
   double rms = 0, worst = 0;
 };
 
-// Of y(h) over basis values of length 1, in all directions; points in `skipped` do not count.
+// Error of y(h) over basis values of length 1, in all directions; points in `skipped` do not count.
 DescriptorError descriptor_error(const FittedPoints& given, const FittedPoints& stored,
                                  std::vector<uint32_t> skipped = {}) {
   std::mt19937 random(5);

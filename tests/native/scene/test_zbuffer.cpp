@@ -38,7 +38,7 @@ std::vector<DepthKey> keys_of(const Scene& scene, const PinholeCamera& camera, d
   return {buffer.keys(), buffer.keys() + size_t(camera.width_px) * size_t(camera.height_px)};
 }
 
-// Of a stored point, from the camera's centre.
+// Vector from the camera's centre to a stored point.
 std::array<long double, 3> stored_position(const Scene& scene, uint32_t point, const PinholeCamera& camera) {
   const maq::SceneBlock* block = scene.blocks;
   while (point >= block->first + block->count) ++block;

@@ -31,7 +31,7 @@ TEST_F(AndroidPictures, EveryLayoutOfPlanesComesAsNv12InVideoRange) {
   }
 }
 
-// Of an image, row by row; rotated by 90 degrees clockwise.
+// Values of an image, row by row; rotated by 90 degrees clockwise.
 struct Grid {
   int columns, rows;
   std::vector<int> values;
@@ -168,7 +168,7 @@ TEST_F(AndroidPictures, TimesAreOfTheMonotonicClock) {
   constexpr int64_t kNow = 5000 * kSecond, kAsleep = 777 * kSecond;
   EXPECT_EQ(maq::camera2_time_ns(kNow - 20, std::nullopt, kNow), kNow - 20);
   EXPECT_EQ(maq::camera2_time_ns(kNow + kAsleep - 20, kNow + kAsleep, kNow), kNow - 20);
-  // What cannot be is the time of arrival.
+  // Impossible timestamps are replaced by the time of arrival.
   for (const int64_t stamp : {kNow + 1, kNow - 11 * kSecond, int64_t(0), int64_t(-1), INT64_MIN, INT64_MAX}) {
     EXPECT_EQ(maq::camera2_time_ns(stamp, std::nullopt, kNow), kNow) << stamp;
   }

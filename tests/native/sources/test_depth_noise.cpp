@@ -17,7 +17,7 @@ class DepthNoise : public ::testing::Test {
  protected:
   static constexpr maq::SolidsPicture kSize{320, 240};
 
-  // Of a plane at that depth that fills the left part of the picture, and one at another depth.
+  // Depth of a plane in the left part of the image, and of a plane at another depth.
   static std::vector<float> two_planes(float left, float right, int border = 160) {
     std::vector<float> metres(320 * 240);
     for (size_t i = 0; i < metres.size(); ++i) metres[i] = int(i % 320) < border ? left : right;

@@ -28,7 +28,7 @@ constexpr int64_t kMillisecond = 1000000;
 constexpr int64_t kPeriod = 1000 * kMillisecond / 30;
 constexpr int kLimitMs = 60000;  // for a defect, not for speed
 
-// What came of a wait: pixels, depth (-1: none), number and time.
+// The result of a wait: pixels, depth (-1: none), number and time.
 struct Picture {
   Camera::Event event = Camera::Event::kTimeout;
   int value = -1, depth_mm = -1;

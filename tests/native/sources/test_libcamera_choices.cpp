@@ -1,4 +1,4 @@
-// What the libcamera backend makes of the formats and controls that a camera offers. Cameras here are lists in memory.
+// The libcamera backend's choice of the formats and controls that a camera offers. Cameras here are lists in memory.
 #include <gtest/gtest.h>
 #include <libcamera/control_ids.h>
 #include <libcamera/formats.h>
@@ -132,7 +132,7 @@ ControlInfoMap board_controls() {
   return ControlInfoMap(std::move(map), controls::controls);
 }
 
-// What the next request takes to the camera: "AeEnable=false".
+// The setting that the next request takes to the camera: "AeEnable=false".
 std::string next_setting(maq::LibcameraControls& book) {
   ControlList request(controls::controls);
   book.take_setting(request);

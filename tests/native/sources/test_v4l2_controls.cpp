@@ -16,7 +16,7 @@ const std::set<uint32_t> kManualAndAperture = {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSU
 
 class V4l2Controls : public LiveCameraTest {
  protected:
-  // Those of a common USB camera.
+  // Controls of a common USB camera.
   void SetUp() override {
     fake_.controls.all = {{V4L2_CID_EXPOSURE_AUTO, {0, 3, 1, V4L2_EXPOSURE_APERTURE_PRIORITY, 0, kManualAndAperture}},
                           {V4L2_CID_EXPOSURE_ABSOLUTE, {3, 2047, 1, 250}},

@@ -1,4 +1,4 @@
-// What the tests of Android's cameras share: an Android in memory, and what its frames must be.
+// Shared by the tests of Android's cameras: an Android in memory, and the expected frames.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ class AndroidCameraTest : public ::testing::Test {
     EXPECT_EQ(fake_.misuse(), "") << what;
   }
 
-  // What wait() says, at once.
+  // The immediate result of wait().
   struct Answer {
     Event event;
     maq::CameraBuffer buffer;

@@ -10,7 +10,7 @@
 #include <exception>
 #include <string>
 
-// What the child said, and how it ended: "" for well, else "hangs", "ends by signal 11", "exits with 3".
+// The child's output, and how it ended: "" for well, else "hangs", "ends by signal 11", "exits with 3".
 struct ChildOutcome {
   std::string said;
   std::string trouble;

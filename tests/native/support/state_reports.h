@@ -8,7 +8,7 @@
 #include "maquette/maquette.h"
 #include "support/wait_until.h"
 
-// What was reported, in order.
+// Collects reports, in order.
 class Reports {
  public:
   static void note(void* self, maq_source_state state, const char*) {

@@ -1,4 +1,4 @@
-// What the C API for scenes does with NULL and with structs of unknown size: a status and a sentence, never a crash.
+// The C API for scenes returns a status and a sentence for NULL and for structs of unknown size. It never crashes.
 #include <gtest/gtest.h>
 
 #include "support/samples/api_tiny_scene.h"

@@ -53,7 +53,7 @@ TEST(HeadSurface, IsClosedAndLiesOnTheFieldAndTheCut) {
   EXPECT_TRUE(facts.is_manifold);
   EXPECT_EQ(facts.euler, 2);
   EXPECT_EQ(facts.pieces, 1);
-  // Of 4/3 the tip below -0.5 is cut off: a pyramid of 1/6 of half a cube.
+  // The volume is 4/3 without the tip below -0.5: a pyramid of 1/6 of half a cube.
   EXPECT_NEAR(facts.volume, 4.0 / 3 - 1.0 / 12, 0.005);
   size_t on_cap = 0, on_field = 0;
   for (size_t i = 0; i < mesh.vertex_count(); ++i) {

@@ -42,7 +42,7 @@ struct GridField {
       for (size_t i = 0; i < n; ++i) f[i] = (*this)(x[i], y[i], z[i]);
     };
   }
-  // Of slopes that exclude nothing.
+  // Options with slopes that exclude nothing.
   MarchingCubesOptions options() const {
     MarchingCubesOptions made;
     made.box_min = {0, 0, 0};

@@ -19,7 +19,7 @@ using maq::head::MeshShading;
 using maq::head::MeshTexture;
 using maq::head::RasterOptions;
 
-// Of pixels given by their row and column as B, G, R.
+// Creates a texture from a function of row and column that returns B, G, R.
 template <class Colour>
 MeshTexture texture_of(int width_px, int height_px, Colour colour) {
   Frame frame;

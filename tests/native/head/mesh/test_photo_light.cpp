@@ -38,7 +38,7 @@ struct Surface {
 };
 
 TEST(PhotoLight, GainOffsetAndDirectionAreFoundFromTheSeenSide) {
-  // f(own, normal) as the model has it; levels as far apart as skin and hair.
+  // f(own, normal) follows the model; levels as far apart as skin and hair.
   const Surface surface(4000, 20, 220, [](float own, const float* normal) {
     return 0.7f * own + 12 + own * (0.2f * normal[0] - 0.1f * normal[2]);
   });

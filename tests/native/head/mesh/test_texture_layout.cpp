@@ -82,7 +82,7 @@ TEST(TextureLayout, ABallHasNoFoldsAndTheCapIsApart) {
 }
 
 TEST(TextureLayout, EqualDirectionsHaveEqualAreas) {
-  // Of the upper half of all directions, which is half of a whole sphere, and the border's 165 degrees.
+  // The upper half of all directions is half of a whole sphere; the border is at 165 degrees.
   const double upper = std::hypot(texture_place({1, 0, -0.6})[0] - 0.5, 0), all = std::hypot(0.485, 0);
   EXPECT_NEAR(upper * upper / (all * all), 0.5 / std::pow(std::sin(165 * 3.14159265 / 360), 2), 1e-4);
 }

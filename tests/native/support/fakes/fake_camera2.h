@@ -98,12 +98,12 @@ class FakeCamera2 {
     maq::ndk::ACameraMetadata metadata;
   };
   std::vector<FakeCamera> cameras;
-  // Of the images that are delivered from now on.
+  // Layout of the images that are delivered from now on.
   Layout layout = Layout::kVu;
   int padding = 0;  // bytes behind each row
   std::optional<std::pair<int, int>> size;
   std::optional<int64_t> timestamp_ns;
-  // What a broken device says of its chroma planes.
+  // Strides of the chroma planes that a broken device reports.
   std::optional<int32_t> row_stride, pixel_stride;
   int missing_bytes = 0;
   bool has_null_plane = false;

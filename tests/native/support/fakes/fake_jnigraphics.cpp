@@ -24,7 +24,7 @@ struct BitmapInfo {
   uint32_t flags;
 };
 
-// What the next calls return instead of success; 0: what they do.
+// Results of the next calls instead of success; 0: real results.
 extern "C" {
 __attribute__((visibility("default"))) int fake_create_result = 0, fake_decode_result = 0, fake_compress_result = 0;
 __attribute__((visibility("default"))) int fake_decoders_alive = 0;

@@ -28,7 +28,7 @@ struct ANativeWindow {
   int width = 0, height = 0;
   bool is_locked = false, is_gone = false;
   std::vector<uint32_t> memory;  // of the buffer that is drawn on
-  // What was posted last, without the padding of rows.
+  // The last posted pixels, without the padding of rows.
   std::vector<uint32_t> shown;
   int shown_width = 0, shown_height = 0, posts = 0;
 };

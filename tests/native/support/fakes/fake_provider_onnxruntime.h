@@ -6,7 +6,7 @@
 extern "C" {
 #endif
 
-// What providers shall say from now on, and what was asked for since.
+// Answers of providers from now on, and the requests since.
 typedef struct FakeProviders {
   int taken_nodes, other_nodes;  // of each graph
   int fails;                     // 1: sessions with a provider cannot be made

@@ -30,13 +30,13 @@ class FakeV4l2 : public maq::SystemCalls {
     int width, height;
     int fps;
   };
-  // What the device offers; TRY_FMT takes the nearest size of a format.
+  // Modes of the device; TRY_FMT takes the nearest size of a format.
   std::vector<Mode> modes = {{V4L2_PIX_FMT_YUYV, 640, 480, 30}, {V4L2_PIX_FMT_YUYV, 320, 240, 30}};
   bool planar = false;
   uint32_t capabilities = V4L2_CAP_STREAMING | V4L2_CAP_VIDEO_CAPTURE;
   uint32_t timestamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   static constexpr unsigned long kOpen = 0, kMmap = 1, kPoll = 2;
-  // What the driver answers, changed by a test that plays a broken one.
+  // Answers of the driver, changed by tests of a broken driver.
   size_t stride_bytes = 0;       // 0: rows without padding
   uint32_t granted_buffers = 0;  // 0: as many as were asked for
   uint32_t buffer_bytes = 0;     // 0: as many as a frame has
@@ -69,12 +69,12 @@ class FakeV4l2 : public maq::SystemCalls {
     poll_error_ = on;
     wake();
   }
-  // What the driver says of frames that are delivered from now on; without a stamp they get the time of delivery.
+  // Sets the driver's timestamp of later frames; without one they get the time of delivery.
   void stamp_frames(std::optional<timeval> stamp) {
     std::lock_guard<std::mutex> lock(mutex_);
     stamp_ = stamp;
   }
-  // What the driver says from now on, of buffers that are as they are.
+  // Sets the offset that the driver reports from now on, for unchanged buffers.
   void set_data_offset(uint32_t offset) {
     std::lock_guard<std::mutex> lock(mutex_);
     said_offset_ = offset;
@@ -131,7 +131,7 @@ class FakeV4l2 : public maq::SystemCalls {
     std::lock_guard<std::mutex> lock(mutex_);
     return exports_;
   }
-  // As the driver has it now.
+  // The current value of a control in the driver.
   int control(uint32_t id) const {
     std::lock_guard<std::mutex> lock(mutex_);
     return controls.all.at(id).value;
@@ -329,7 +329,7 @@ class FakeV4l2 : public maq::SystemCalls {
     const bool jpeg = fourcc == V4L2_PIX_FMT_MJPEG;
     const auto width_px = uint32_t(best->width), height_px = uint32_t(best->height);
     const size_t row = jpeg ? 0 : stride_bytes != 0 ? stride_bytes : row_of(fourcc, best->width);
-    // Of NV12M the second plane has longer lines, so that using one stride for both is noticed.
+    // The second plane of NV12M has longer lines, which reveals the use of one stride for both.
     const size_t rows[2] = {row, row + 32};
     size_t bytes[2] = {(jpeg ? 2 * width_px : row) * height_px, rows[1] * height_px / 2};
     if (fourcc == V4L2_PIX_FMT_NV12) bytes[0] += row * height_px / 2;

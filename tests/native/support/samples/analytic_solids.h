@@ -336,7 +336,7 @@ inline SeenScene see(SolidScene scene, const Intrinsics& camera, double eps_r = 
   return seen;
 }
 
-// What networks and cameras do to it: the field blurred (px) and with noise (r), depth near edges mixed of both sides,
+// Errors of networks and cameras: the field blurred (px) and with noise (r), depth near edges mixed from both sides,
 // and with noise (r along the ray).
 struct Damage {
   double blur_px = 0, noise_r = 0;

@@ -29,7 +29,7 @@ inline maq_scene_renderer_config renderer_config() {
   return config;
 }
 
-// What is in capture/cloud.ply.
+// The points of capture/cloud.ply.
 inline std::vector<float> capture_places() {
   const std::string bytes = read_text(kCapture + "/cloud.ply"), end = "end_header\n";
   const std::string numbers = bytes.substr(bytes.find(end) + end.size());
@@ -91,7 +91,7 @@ struct Photo {
   maq_frame_desc desc;
 };
 
-// Of the ball, from four sides.
+// A scene of the ball, from four sides.
 inline maquette::Scene ball_scene(const maquette::Context& context, size_t points = 2000) {
   const std::vector<float> places = ball(points);
   maquette::SceneBuilder builder(context, build_config(), cloud_of(places));

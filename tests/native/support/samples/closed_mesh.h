@@ -1,4 +1,4 @@
-// What makes a mesh of triangles closed and manifold, and how large it is.
+// Tests whether a mesh of triangles is closed and manifold, and measures it.
 #pragma once
 
 #include <algorithm>

@@ -24,7 +24,7 @@ inline double brightness(double x, double y) {
   return sum;
 }
 
-// Of a line of points, sine and cosine of each wave: [points][waves][2].
+// Sine and cosine of each wave along a line of points: [points][waves][2].
 inline std::vector<double> sines(double first, double step, int count, double Wave::*rate, bool has_phase) {
   std::vector<double> found;
   for (int i = 0; i < count; ++i) {

@@ -49,7 +49,7 @@ inline maq::PinholeCamera camera_of(int width, int height, double degrees) {
   return camera;
 }
 
-// Of a quaternion (w, x, y, z) of any length.
+// The rotation of a quaternion (w, x, y, z) of any length.
 inline std::array<double, 9> rotation_of(double w, double x, double y, double z) {
   const double length = std::sqrt(w * w + x * x + y * y + z * z);
   w /= length, x /= length, y /= length, z /= length;

@@ -30,7 +30,7 @@ inline std::unique_ptr<maq::Edges> edges(int threads = 1, int average_frames = 1
   return std::make_unique<maq::Edges>(runtime(), maq::read_bundle(kBundle), settings);
 }
 
-// What torch was given and what it found, for a frame of one of two sizes.
+// Input and output of torch for a frame of one of two sizes.
 struct Case {
   int width, height;
   std::string name() const { return std::to_string(width) + "x" + std::to_string(height); }

@@ -35,7 +35,7 @@ struct Descriptor {
   float constant_terms[maq::kFeatures], linear_terms[maq::kLinearTerms], view_dependence;
 };
 
-// What torch found.
+// Descriptors that torch computed.
 inline std::vector<Descriptor> expected_descriptors() {
   const std::string bytes = read_text(kFolder + "/looks.bin");
   std::vector<Descriptor> descriptors(bytes.size() / sizeof(Descriptor));

@@ -30,7 +30,7 @@ inline std::vector<float> floats_of(const std::string& file) {
   return values;
 }
 
-// Of tiny_prediction::frame(number), by torch.
+// Codes of tiny_prediction::frame(number), by torch.
 inline const uint16_t* codes(int number) {
   static const std::vector<uint16_t> all = [] {
     std::vector<uint16_t> values;
@@ -40,7 +40,7 @@ inline const uint16_t* codes(int number) {
   return all.data() + size_t(number) * kCodes;
 }
 
-// What frame `number` of tiny_prediction is foreseen from.
+// The codes from which frame `number` of tiny_prediction is predicted.
 inline maq::CodesBefore before(int number) {
   maq::CodesBefore before;
   for (int back = 1; back <= 3 && number - back >= 0; ++back) before.frames[size_t(3 - back)] = codes(number - back);

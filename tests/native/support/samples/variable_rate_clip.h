@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-// Of a file with one track, with its index before its frames and the times of frames as differences (stts, ctts).
+// Reads a file with one track, with its index before its frames and the times of frames as differences (stts, ctts).
 class VariableRateClip {
  public:
   // `steps`: from each frame to the next, in units of the track, in turns.
@@ -43,7 +43,7 @@ class VariableRateClip {
   }
 
   const std::string& bytes() const { return bytes_; }
-  // Of the frames in their order.
+  // Times of the frames in their order.
   std::vector<double> times_s() const {
     std::vector<double> seconds;
     for (const int64_t time : times_) seconds.push_back(double(time) * unit_s_);

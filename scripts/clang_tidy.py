@@ -31,7 +31,7 @@ def cache_folder() -> Path:
 
 @functools.cache
 def hash_of(path: Path) -> str:
-    """Of a file's bytes; of a missing file, of nothing."""
+    """Returns the SHA-256 of a file's bytes; of no bytes if the file is missing."""
     return hashlib.sha256(path.read_bytes() if path.is_file() else b"").hexdigest()
 
 
@@ -101,7 +101,7 @@ class Checker:
         return all(hash_of(self.root / path) == wanted for path, wanted in json.loads(stamp.read_text()).items())
 
     def check(self, compilation: Compilation) -> str:
-        """What clang-tidy says of the sources; nothing when they are clean."""
+        """Returns clang-tidy's messages for the sources; nothing when they are clean."""
         if self.is_known_clean(compilation):
             return ""
         paths = [Path(os.path.normpath(path)) for path in compilation.dependencies()]

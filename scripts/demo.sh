@@ -26,7 +26,7 @@ done
 printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 1024 --preview %s/head_turning.mp4\n' "$out" "$out"
 "$maquette" head tests/media/photo.jpg --out "$out/head.glb" --texture 1024 --preview "$out/head_turning.mp4"
 
-# What the clip shows next, beside what it did show, and how surprising each of its frames is.
+# Predicts the next frames of the clip, next to the real ones, and scores the novelty of each frame.
 printf '\n== maquette predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out %s/next.mp4\n' "$out"
 "$maquette" predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out "$out/next.mp4"
 printf '\n== maquette novelty tests/media/clip.mp4 --out %s/novelty.mp4\n' "$out"

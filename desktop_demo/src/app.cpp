@@ -205,7 +205,7 @@ void App::load_outfit(const std::string& path) {
   });
 }
 
-// Of a run without a user, as one line of JSON. Returns the exit code.
+// Reports a run without a user, as one line of JSON. Returns the exit code.
 int App::report(const maquette::RgbaImage& screenshot) {
   if (!options_.screenshot.empty() && !screenshot.empty()) screenshot.as_frame(context_).save(options_.screenshot);
   nlohmann::ordered_json json;

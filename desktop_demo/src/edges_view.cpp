@@ -171,7 +171,7 @@ void EdgesView::draw_layers() {
   draw_pause();
 }
 
-// What is switched off is not computed.
+// Options that are switched off are not computed.
 void EdgesView::draw_model_options() {
   bool changed = ImGui::Checkbox("curves (C)", &model_.finds_curves);
   ImGui::SameLine(150 * window_.scale());

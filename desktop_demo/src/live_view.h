@@ -1,4 +1,4 @@
-// What views of a live source share: opening, pausing and recording it, and what is said and reported of it.
+// Shared by views of a live source: opening, pausing and recording it, its messages and its report.
 #pragma once
 
 #include <app/live_pipeline.h>
@@ -7,7 +7,7 @@
 
 #include "main_view.h"
 
-// Of a view: the sources that it opens by itself.
+// The sources that a view opens by itself.
 struct OwnSources {
   const char* start;     // when the user comes to the view and there is no source yet
   const char* camera;    // when they look for a camera
@@ -36,7 +36,7 @@ class LiveView : public MainView {
   void add_to_report(nlohmann::ordered_json* report) const override;
 
  protected:
-  // Of what the view plays by; must outlive the view's calls.
+  // Sets the player of the view; it must outlive the view's calls.
   void set_live(maquette::LivePlayer* live) { live_ = live; }
   // To be asked before a frame is taken, which then is the last.
   void note_end() { has_ended_ = live_->status().has_ended; }

@@ -1,4 +1,4 @@
-// What fills the window beside the panel: people (PeopleView), edges (EdgesView), prediction (PredictionView), a
+// The content of the window next to the panel: people (PeopleView), edges (EdgesView), prediction (PredictionView), a
 // scene (SceneView) or a head (HeadView).
 #pragma once
 
@@ -11,7 +11,7 @@
 #include "screen/painter.h"
 #include "screen/window.h"
 
-// What the user wants that is not the view's own business, by a key or a button.
+// Requests of the user, by a key or a button, that the view cannot handle itself.
 enum class Action {
   kNone,
   kOpenCamera,
@@ -27,7 +27,7 @@ enum class Action {
   kHelp
 };
 
-// What pointer and arrow keys did since the last frame.
+// Movements by pointer and arrow keys since the last frame.
 struct Steering {
   float seconds = 0;
   float right = 0, down = 0;                    // in radians

@@ -1,4 +1,4 @@
-// What the demo is started with.
+// Options of the demo's command line.
 #pragma once
 
 #include <app/edge_picture.h>

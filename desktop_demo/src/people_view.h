@@ -16,7 +16,7 @@ class PeopleView final : public LiveView {
 
   bool is_trying_on() const { return view_ == View::kTryOn; }
 
-  // What is shown, with the largest head; nothing before the first picture.
+  // The current image with the largest head; nothing before the first image.
   std::optional<maquette::LiveHeadPhoto> head_photo() const;
 
   bool update() override;

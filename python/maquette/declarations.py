@@ -18,8 +18,8 @@ _DIRECTIVE = re.compile(r"^#.*$", re.MULTILINE)
 
 
 def declarations(headers: Path) -> str:
-    """What cffi's `cdef` takes, out of the folder of maquette.h. Constants come as enumerators, since `cdef` reads no
-    expressions in a #define."""
+    """Returns declarations for cffi's `cdef`, from the folder of maquette.h. Constants become enumerators, because
+    `cdef` reads no expressions in a #define."""
     parts = []
     features = (headers / "features.h").read_text()
     umbrella = (headers / "maquette.h").read_text()

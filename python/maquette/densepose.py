@@ -27,9 +27,9 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class DensePoseResult:
-    """Of an image of H x W pixels. people: best score first. part: uint8 [H, W], body part 1 to 24 (DensePose's
-    numbering), 0 for background. u, v: uint8 [H, W], the place on the part times 255. person: uint8 [H, W], index in
-    `people` plus 1. stats: times and counts, the fields of maq_densepose_stats."""
+    """Result for an image of H x W pixels. people: best score first. part: uint8 [H, W], body part 1 to 24
+    (DensePose's numbering), 0 for background. u, v: uint8 [H, W], the coordinate on the part times 255. person:
+    uint8 [H, W], index in `people` plus 1. stats: times and counts, the fields of maq_densepose_stats."""
 
     people: list[Person]
     part: np.ndarray

@@ -68,8 +68,8 @@ class Intrinsics:
 
 @dataclass(frozen=True)
 class Origin:
-    """Of a frame that was made up: from how old a frame. horizon_s: from the captured frame that it was made from to
-    its own time. age_s: since that frame was captured, until now. captured_sequence: the number of that frame."""
+    """Origin of a predicted frame: the captured frame that it is based on. horizon_s: time from the captured frame to
+    the predicted one. age_s: time since the captured frame, until now. captured_sequence: its sequence number."""
 
     horizon_s: float
     age_s: float

@@ -27,11 +27,11 @@ _ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
 
 @dataclass(frozen=True)
 class HeadPhoto:
-    """What was found in a photo. box_px: of the head, given or detected: left, top, right, bottom; right and bottom are
+    """Result for a photo. box_px: box of the head, given or detected: left, top, right, bottom; right and bottom are
     exclusive. head_coverage: fraction of the encoder's crop that shows the head, 0 to 1. The other fields describe the
     latest fit, and are 0 before. is_used: whether the head was fitted to the photo; photos without a head or of a
-    different person are rejected. focal_px: focal length, given or estimated. rms_px: root mean square distance of head
-    points from where the network saw them."""
+    different person are rejected. focal_px: focal length, given or estimated. rms_px: root mean square distance
+    between projected head points and the network's estimates."""
 
     box_px: tuple[float, float, float, float]
     head_coverage: float
@@ -357,7 +357,7 @@ class HeadBuilder(NativeObject):
 
     @property
     def photos(self) -> list[HeadPhoto]:
-        """What was found in each photo, in the order of `add_photo`."""
+        """Results for the photos, in the order of `add_photo`."""
         count = self.stats["photo_count"]
         found = native().indexed("maq_head_builder_get_photo", self.handle, "maq_head_photo_info", count)
         return [HeadPhoto(tuple(p.box_px), p.head_coverage, bool(p.is_used), p.focal_px, p.rms_px) for p in found]

@@ -197,7 +197,7 @@ class ProgressCallback:
         self._raised = error
 
     def run(self, call: Callable[[], T]) -> T:
-        """What `call` returns, in which the library calls back. Raises MaquetteError, and what the function raises."""
+        """Returns the result of `call`, which calls back. Raises MaquetteError, and the exceptions of the callback."""
         self._raised, result = None, None
         try:
             result = call()

@@ -29,7 +29,7 @@ void set_pixel(uint8_t* to, float level, float bright) {
   }
 }
 
-// Of known depths their inverse, since that is how precise they are: 2 % are below `low`, 2 % above `high`.
+// Range of inverse depth, since depth is precise in its inverse: 2 % of known depths are below `low`, 2 % above `high`.
 struct InverseRange {
   float low = 0, high = 1;
   float level(float depth_m) const { return (1 / depth_m - low) / std::max(high - low, 1e-3f * high); }

@@ -30,7 +30,8 @@ enum class EdgeLayer {
 };
 constexpr std::array<const char*, 3> kEdgeLayerNames = {"depth", "distance", "plain"};
 
-// Of the field's size, each pixel one; black where depth is unknown. `picture` keeps its memory.
+// Draws an image of the field's size, one pixel for each value; black where depth is unknown. `picture` keeps its
+// memory.
 void draw_edge_layer(const EdgesResult& result, EdgeLayer layer, RgbaImage* picture);
 
 using Point3 = std::array<double, 3>;  // metres, of the camera: x right, y down, z ahead

@@ -30,7 +30,7 @@ struct EdgesFrame {
   double drawing_ms = 0, waiting_ms = 0, age_ms = -1, results_per_second = 0;
   uint64_t number = 0;  // 0: none yet
 
-  // Of a pipeline that finds edges.
+  // Takes a result of a pipeline that finds edges.
   void take(PipelineResult from, double rate, EdgeLayer of_layer);
   // At a pixel of the field, which may be any place. Nothing where no curves were found.
   EdgesPick pick(double x_px, double y_px, double radius_px) const;

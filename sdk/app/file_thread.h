@@ -32,7 +32,7 @@ class FileThread {
     std::lock_guard<std::mutex> lock(mutex_);
     return jobs_.size() >= 30;
   }
-  // Of the latest job that had one; or why it failed.
+  // Message of the latest job that had one, or the reason why it failed.
   std::string message() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return message_;

@@ -124,7 +124,7 @@ class LiveHead {  // all calls by the thread that takes the images
   TripleBuffer<LiveHeadImage> images_;
   uint64_t image_count_ = 0;                // of the thread that renders
   std::optional<HeadBuilder> builder_;      // of the thread that fits
-  std::shared_ptr<const RgbaImage> photo_;  // likewise: the latest
+  std::shared_ptr<const RgbaImage> photo_;  // the latest; of the thread that fits
   std::thread fits_, renderings_;
 };
 

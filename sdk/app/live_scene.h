@@ -86,7 +86,7 @@ class LiveScene {  // all calls by the thread that takes the images
   Request request_;
   std::shared_ptr<const LiveSceneState> state_ = std::make_shared<LiveSceneState>();
   TripleBuffer<LiveSceneImage> images_;
-  // Of the thread alone:
+  // Used only by the thread:
   std::optional<Capture> capture_;
   std::optional<Scene> scene_;
   std::optional<SceneRenderer> renderer_;

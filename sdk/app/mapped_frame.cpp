@@ -20,7 +20,7 @@ void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint
       for (int x = 0; x < camera.width_px; ++x, to += 4) *to = from[x];
     }
   }
-  // What was seen fades within a second or so.
+  // Seen cells fade within a second or so.
   seen_before->resize(24 * kSeenCells * kSeenCells);
   for (uint8_t& cell : *seen_before) cell = uint8_t(cell * 15 / 16);
   for (size_t at = 0; at < iuv.size(); at += 4) {

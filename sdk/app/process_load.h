@@ -1,4 +1,4 @@
-// What this process takes of the machine, for a panel.
+// The CPU time and memory that this process uses, for a panel.
 #pragma once
 
 #include <sys/resource.h>

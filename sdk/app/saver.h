@@ -44,7 +44,7 @@ class Saver {  // all calls by one thread
   std::string new_path(const char* extension);
   // Another job for the thread that writes, in its turn.
   void run(FileThread::Job job) { files_.add(std::move(job)); }
-  // What was saved last, or why it was not, for five seconds.
+  // Name of the last saved file, or the reason why it was not saved, for five seconds.
   std::string message();
 
  private:

@@ -9,16 +9,16 @@ namespace maquette {
 template <class T>
 class TripleBuffer {
  public:
-  // Of the writing thread: the value that it fills next. It holds an older one, whose memory can be used again.
+  // For the writing thread: the value that it fills next. It holds an older value, whose memory can be reused.
   T& back() { return back_; }
-  // Of the writing thread: back() is the newest value from now on.
+  // For the writing thread: back() is the newest value from now on.
   void publish() {
     std::lock_guard<std::mutex> lock(mutex_);
     std::swap(back_, middle_);
     is_fresh_ = true;
   }
 
-  // Of the reading thread: true when front() has become a newer value.
+  // For the reading thread: true when front() has become a newer value.
   bool take() {
     std::lock_guard<std::mutex> lock(mutex_);
     if (!is_fresh_) return false;

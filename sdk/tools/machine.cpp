@@ -13,7 +13,7 @@
 
 namespace {
 
-// What follows "key" and a colon in a file of such lines; "" if it is not there.
+// The text after "key" and a colon in a file of such lines; "" if there is none.
 std::string value_of(const char* path, const std::string& key) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {

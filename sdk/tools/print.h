@@ -16,10 +16,10 @@ std::string printable(const std::string& text);
 
 // As printf, but made printable apart from line ends. Throws OutputLost, at the latest at the next flush_output().
 [[gnu::format(printf, 1, 2)]] void print_output(const char* format, ...);
-// Writes text with the control characters that are in it. Throws likewise.
+// Writes text with its control characters. Throws OutputLost too.
 void print_unchanged(const std::string& text);
 // Throws OutputLost.
 void flush_output();
 
-// Likewise on standard error; what cannot be written there is lost.
+// The same on standard error; text that cannot be written there is lost.
 [[gnu::format(printf, 1, 2)]] void print_error(const char* format, ...);

@@ -27,7 +27,7 @@ void fill_standard_descriptors() {
   }
 }
 
-// What is wrong with a word where a command is expected; CLI11 says only that one is required. "" when nothing is.
+// Returns the fault of a word where a command is expected, or ""; CLI11 says only that a command is required.
 std::string unknown_command(const CLI::App& app, int argc, char** argv) {
   const CLI::App* at = &app;
   std::string path = app.get_name().empty() ? "maquette" : app.get_name();

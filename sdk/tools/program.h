@@ -1,4 +1,4 @@
-// What the programs of this folder have in common.
+// Shared by the programs of this folder.
 #pragma once
 
 #include <exception>

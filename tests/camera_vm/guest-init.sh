@@ -36,7 +36,7 @@ wait_until() {
     done
 }
 
-# What udev would note down of each camera; libcamera takes no device without it.
+# Writes udev's notes of each camera; libcamera uses no device without them.
 note_cameras_for_udev() {
     mkdir -p /run/udev/data
     for device in /sys/class/video4linux/* /sys/bus/media/devices/*; do

@@ -3,7 +3,7 @@
 export LD_LIBRARY_PATH=/opt/maquette/lib
 maquette=/opt/maquette/bin/maquette
 
-# Of any number: as long as a program holds a frame of the camera that went away, the next one gets another.
+# The number may differ: while a program holds a frame of the lost camera, the next camera gets another number.
 has_camera() { ls /dev/video[0-9]*; }
 has_no_camera() { ! has_camera; }
 plug_in() {
@@ -103,7 +103,7 @@ doctor_names_who_uses_it() {
     wait $other
     return $status
 }
-# What was recorded is replayed, frame by frame.
+# A recording is replayed, frame by frame.
 records_and_plays() {
     $maquette record "v4l2:/dev/video0?size=320x240&format=YUYV" /tmp/take.maqrec --frames 20 && \
         $maquette play /tmp/take.maqrec --speed 4 && $maquette play /tmp/take.maqrec --frames 3 | grep "^3 frames of 320 x 180"

@@ -49,7 +49,7 @@ done
 cc -std=c11 -Wall -Wextra -Werror -O2 -shared -fPIC -I sdk/include -o "$work/count_allocations.so" \
     benchmarks/count_allocations.c
 
-# What each guest gets; its script is guest-NAME.sh.
+# Packs the files of each guest; its script is guest-NAME.sh.
 pack() {
     local contents=(--file "tests/camera_vm/guest-$1.sh=test.sh"
         --program "$work/capture" --program "$(command -v v4l2-ctl)")

@@ -51,7 +51,7 @@ def uris(samples: Samples, rng: Random, index: int) -> Trial:
 
 @cache
 def _options(program: Path, command: tuple[str, ...]) -> tuple[str, ...]:
-    """Those that take a value, by the program's own help."""
+    """Returns the options that take a value, by the program's own help."""
     text = subprocess.run([program, *command, "--help"], capture_output=True, text=True, check=True).stdout
     return tuple(re.findall(r"^  (?:-\w,)?(--[\w-]+) (?:TEXT|INT|UINT|FLOAT)", text, re.MULTILINE))
 

@@ -10,7 +10,7 @@ from tests.hostile.samples import DENSEPOSE, Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
 SIDES = (0, 1, 63, 65, 4096, 16384, 65535, 1 << 24, (1 << 31) - 1, 1 << 31, (1 << 32) - 1)
-# What begins as an image of a kind that may not be read: the message has to name the kind, or read it.
+# Beginnings of image kinds that may be unsupported: the program reads the image, or its message names the kind.
 OTHER_KINDS = {
     "a.gif": b"GIF89a\x10\0\x10\0\xf0\0\0\0\0\0\xff\xff\xff,\0\0\0\0\x10\0\x10\0\0\x02\x0e\x8c\x8f\xa9\xcb\xed\x0f;",
     "a.heic": struct.pack(">I", 24) + b"ftypheic\0\0\0\0mif1heic" + bytes(200),

@@ -42,7 +42,7 @@ def unchecked(samples: Samples, rng: Random, index: int) -> Trial:
 
 
 def heads(samples: Samples, rng: Random, index: int) -> Trial:
-    """What the recording says of itself, with a check that fits."""
+    """Changes the recording's description, with a correct check."""
     name, data = _sample(samples, rng)
     magic, version, length, _ = HEAD.unpack_from(data)
     described = json.loads(data[HEAD.size : HEAD.size + length])

@@ -19,7 +19,7 @@ CLIP = ROOT / "tests/media/clip.mp4"
 # A head of a photo, a.jpg: the encoder of this bundle sees one wherever a photo is not black.
 HEAD = ("head", "a.jpg", "--bundle", str(HEADS_BUNDLE), "--threads", "1", "--seconds", "0", "--cell", "20",
         "--box", "10,10,50,40")  # fmt: skip
-# What every run of dense pose has: small networks, one thread, one or two frames.
+# Arguments of every run of dense pose: small networks, one thread, one or two frames.
 DENSEPOSE = ("densepose", "--bundle", str(PEOPLE_BUNDLE), "--threads", "1", "--max-frames", "2", "--out", "out")
 
 

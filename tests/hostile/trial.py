@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# What a run may take without limits of its own. Good runs of the same commands stay below a second and 150 MiB.
+# Limits of a run without its own limits. Good runs of the same commands stay below a second and 150 MiB.
 MAX_SECONDS = 20
 MAX_MEMORY_BYTES = 1 << 30
 MAX_ADDRESS_SPACE_BYTES = 8 << 30  # of the release build: keeps the machine alive; sanitizers map terabytes

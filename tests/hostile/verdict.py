@@ -1,4 +1,4 @@
-"""What an outcome is: fine, a crash, a hang, or unclear to the person who meets it."""
+"""The verdict on an outcome: fine, a crash, a hang, or unclear to the person who meets it."""
 
 import re
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ CRASHED = re.compile(
     rb"(Address|Leak|Thread|UndefinedBehavior)Sanitizer|runtime error:|terminate called|Assertion .* failed|"
     rb"stack smashing|double free|free\(\): |malloc\(\): |corrupted|buffer overflow detected"
 )
-# What only a programmer understands.
+# Texts that only a programmer understands.
 INTERNAL = re.compile(
     r"std::|basic_string|bad_alloc|what\(\)|json\.exception|nlohmann|cv::|OpenCV\(|\b[Ee]xception\b|stoi|stod|"
     r"filesystem error|defect of|_M_|vector::|0x[0-9a-f]{8}|\.cpp\b"

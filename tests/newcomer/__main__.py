@@ -101,7 +101,7 @@ def wait_for_words(process: subprocess.Popen, pattern: str, output: Path) -> lis
 
 
 def run_block(system: BareSystem, block: Block, output: Path, display: str, window: Path) -> list[str]:
-    """What went wrong with `block`; nothing if it went as the README says."""
+    """Returns the fault of `block`; nothing if it does what the README says."""
     with system.running(block.script, CLONE, output, display) as process:
         if block.seconds_until_interrupted is not None:
             problems = look_and_interrupt(process, block, window, output.with_name("screen.xwd"))

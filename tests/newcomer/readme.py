@@ -13,10 +13,10 @@ UNTIL_INTERRUPTED = {"make desktop-demo": 15, "maquette play": 5}
 # run in continuous integration.
 UNTIL_PRINTED = {"make test": r"(?m)^# [\w-]+ passed in \d+ s"}
 
-# What the reader has beforehand, under the names that the README uses: name in the README, file of the clone.
+# Files that the reader has beforehand, by the names that the README uses: name in the README, file of the clone.
 READERS_FILES = {"photo.jpg": "tests/media/photo.jpg", "clip.mp4": "tests/media/clip.mp4"}
 
-# What a command promises: text of the command, and a pattern of files of the clone, or of its output.
+# Promises of commands: text of the command, and a pattern of files of the clone, or of its output.
 PRINTS = "prints:"
 PROMISES = {
     "make demo": "demo-output/*.png",

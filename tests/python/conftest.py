@@ -1,5 +1,5 @@
-"""What several files need: one thread for torch and numpy, of which a second would wait for a processor that another
-group of tests has; signal handlers put back; and what is slow to make (the body, its atlas, a renderer of undressed
+"""Shared fixtures. torch and numpy get one thread: a second would wait for a processor that another group of tests
+uses. Signal handlers are put back. Slow objects are made once (the body, its atlas, a renderer of undressed
 bodies)."""
 
 import os

@@ -48,7 +48,7 @@ EdgesDrawing::EdgesDrawing(const maquette::EdgesFrame& frame, const Rect& rect, 
 
 EdgesDrawing::~EdgesDrawing() { list_->PopClipRect(); }
 
-// What is far outside of the picture is drawn no farther.
+// Points far outside of the image are moved nearer to it.
 ImVec2 EdgesDrawing::on_screen(const maquette::Pixel& at) const {
   const auto place = [&](double pixel, int from, int side) {
     const double units = (pixel + 0.5) * double(px_);

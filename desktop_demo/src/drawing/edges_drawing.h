@@ -1,4 +1,4 @@
-// What is drawn over the picture of edges: curves, corners, boxes with their lengths, a legend, what the pointer is at.
+// Draws over the image of edges: curves, corners, boxes with their lengths, a legend, and the target at the pointer.
 #pragma once
 
 #include <app/edges_frame.h>

@@ -1,4 +1,4 @@
-// What a person writes for a source, and the names of the files made from it.
+// A source as the user writes it, and the names of the files made from it.
 #pragma once
 
 #include <string>

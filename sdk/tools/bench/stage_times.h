@@ -36,7 +36,7 @@ class StageTimes {
   double seconds_ = 0, processor_s_ = 0;
 };
 
-// What other processes took of the processors since it was made.
+// CPU time that other processes took since this object was created.
 class OtherProcesses {
  public:
   OtherProcesses();

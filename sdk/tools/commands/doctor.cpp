@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// What was found, and for what is not well a remedy.
+// Print a finding; a bad one has a remedy.
 void well(const std::string& text) { print_output("  ok    %s\n", text.c_str()); }
 void note(const std::string& text) { print_output("  note  %s\n", text.c_str()); }
 void unwell(const std::string& text, const std::string& remedy) {

@@ -50,7 +50,7 @@ int play(const PlayOptions& options) {
     if (options.speed != 1) uri = with_option(uri, "speed", std::to_string(options.speed));
   }
   PlayStatistics statistics(options.frames);
-  // What happens later is in the statistics, and would come between the lines of a picture.
+  // Later events are in the statistics; a message would come between the lines of an image.
   std::atomic<bool> is_opening{true};
   maq_context_config log = maquette::default_context_config();
   log.log_user_data = &is_opening;

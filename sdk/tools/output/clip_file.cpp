@@ -9,7 +9,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Of a clip in the SDK.
+// Limits of a clip in the SDK.
 constexpr double kMinFps = 0.01;
 constexpr double kMaxFps = 1000;
 

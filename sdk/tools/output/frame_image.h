@@ -7,5 +7,5 @@
 // BGR, a copy.
 cv::Mat image_of(const maquette::Frame& frame);
 
-// Of the image's memory, which must stay until the frame is gone. BGR.
+// Wraps the image's memory, which must stay until the frame is gone. BGR.
 maquette::Frame frame_of(const maquette::Context& context, const cv::Mat& image);

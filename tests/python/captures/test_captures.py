@@ -30,7 +30,7 @@ def looking(eye, target=(0, 0, 0)) -> Camera:
 
 
 def seen_wall(camera: Camera, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What a camera sees of the wall y = 0 with `pattern` from -1 to 1, and its depth."""
+    """Returns a camera's image of the wall y = 0 with `pattern` from -1 to 1, and its depth."""
     x, y = np.meshgrid(*(np.arange(n) for n in SIZE))
     rays = np.stack([x, y, np.ones_like(x)], -1) @ np.linalg.inv(camera.intrinsics).T @ camera.rotation
     depth = -camera.centre[1] / rays[..., 1]

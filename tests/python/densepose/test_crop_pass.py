@@ -53,7 +53,7 @@ def test_only_who_leans_is_rotated():
 
 
 def maps_of(label: np.ndarray, side: int = 64) -> list[torch.Tensor]:
-    """What a perfect dense head says of labels [s, s, 3] at its cells."""
+    """Returns the output of a perfect dense head for labels [s, s, 3] at its cells."""
     part = torch.from_numpy(label[..., 0]).long()
     index = 20.0 * torch.nn.functional.one_hot(part, 25).permute(2, 0, 1)
     coarse = torch.zeros(15, side, side)

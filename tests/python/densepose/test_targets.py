@@ -1,4 +1,4 @@
-"""What the network is asked to learn from a labelled picture."""
+"""Training targets of a labelled image."""
 
 import numpy as np
 import pytest

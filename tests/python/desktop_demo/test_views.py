@@ -1,4 +1,4 @@
-"""What the desktop demo shows of people: the same frames through the command line say where which colours belong."""
+"""The desktop demo's views of people: the command line's results for the same frames say which colour belongs where."""
 
 import shutil
 from functools import cache
@@ -34,7 +34,7 @@ def mapped(source, tmp_path_factory) -> Mapped:
 
 @pytest.fixture(scope="module")
 def shown(source, tmp_path_factory):
-    """What the program shows of the source, by view and options; one run serves every test that asks for the same."""
+    """Returns the program's image of the source, by view and options; tests with equal arguments share one run."""
     folder = tmp_path_factory.mktemp(f"shown_{source}")
 
     @cache
@@ -157,7 +157,7 @@ def test_boxes_are_drawn_around_people_with_their_scores(shown, mapped):
 
 
 def worn_shades(at_pixels, mapped, texture, where):
-    """Of each pixel: the factor that takes the texture's colour nearest to what is shown, and how far off it stays."""
+    """Returns, for each pixel, the factor that fits the texture's colour to the shown colour best, and the residual."""
     label = mapped.iuv[where]
     wanted = outfit.looked_up(texture, label[:, 0], label[:, 1:] / 255.0).astype(float)
     got = at_pixels[where].astype(float)

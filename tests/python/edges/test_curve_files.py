@@ -18,7 +18,7 @@ def length(points: np.ndarray) -> float:
 
 @pytest.fixture(scope="module")
 def expected() -> list[np.ndarray]:
-    """The points of each curve, as the JSON has them."""
+    """The points of each curve in the JSON."""
     return curves_of(json.loads((DATA / "example.json").read_text()))
 
 

@@ -1,6 +1,6 @@
-"""Stiff cases for the network that is shipped, on depth that can be written down: planes, steps, round things, creases.
+"""Degenerate cases for the shipped network, on depth with a formula: planes, steps, round objects, creases.
 
-Where the network does not keep what is aimed at, the bound is what it reaches (docs/research/edges.md, "Stiff cases").
+Where the network misses a target, the bound is its result (docs/research/edges.md, "Degenerate cases").
 """
 
 from pathlib import Path
@@ -192,7 +192,7 @@ def scene() -> np.ndarray:
 
 @pytest.mark.usefixtures("one_thread")
 def test_the_scale_of_a_scene_is_without_effect():
-    """Of the fp32 network; that of 8 bits may round a value at the border of two steps to the other one."""
+    """The fp32 network is tested: the int8 network may round a value at the border of two steps to the other one."""
     network, config = load_network(Path("export/weights/edges.pt"))
     field = field_of(network.eval(), config.bins)
     depth = scene().astype(np.float32)

@@ -59,7 +59,7 @@ def test_distances_are_exact_beside_a_bald_head(maker):
     head = maker.make(identity, rng, bald)
     place = head.samples(800, rng)
     points, normals = head.points_at(place), head.normals_at(place)
-    # Of convex places: the crown and the back, where nothing else is near.
+    # Convex parts: the crown and the back, where no other surface is near.
     open_sky = (points[:, 2] > 0.7) | ((points[:, 1] > 0.6) & (points[:, 2] > -0.2))
     assert open_sky.sum() > 50
     for step in (0.1, -0.1):

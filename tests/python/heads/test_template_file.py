@@ -12,7 +12,7 @@ from export.heads.template_file import Kind, Template, read_template, template_b
 
 TINY = Path("tests/native/data/tiny_head/template.maqt")
 SHIPPED = Path("sdk/models/heads-int8/template.maqt")
-# Of ARKit's face tracking.
+# Facial actions of ARKit's face tracking.
 SIDES = ("browDown", "browOuterUp", "cheekSquint", "eyeBlink", "eyeLookDown", "eyeLookIn", "eyeLookOut", "eyeLookUp",
          "eyeSquint", "eyeWide", "mouthDimple", "mouthFrown", "mouthLowerDown", "mouthPress", "mouthSmile",
          "mouthStretch", "mouthUpperUp", "noseSneer")  # fmt: skip

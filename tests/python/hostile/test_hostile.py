@@ -74,7 +74,7 @@ def test_crashes_hangs_and_unclear_errors_are_found(what, reason, given, outcome
     assert reason in found.reason
 
 
-# What a program in the place of ours does, and what is said of it.
+# Behaviour of a program that replaces ours, and the verdict on it.
 STAND_INS = [
     (FINE, "import sys; sys.exit('maquette: a is damaged.')"),
     (CRASH, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"),

@@ -74,7 +74,7 @@ def started(*command: str) -> subprocess.Popen:
 
 
 def line_with(process: subprocess.Popen, pattern: str) -> str:
-    """What the pattern's group finds in the program's output."""
+    """Returns the match of the pattern's group in the program's output."""
     for line in process.stdout:
         if found := re.search(pattern, line):
             return found[1]

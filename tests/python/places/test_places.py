@@ -81,7 +81,7 @@ def test_what_one_view_sees_the_next_ones_see_at_the_same_depth(folders, kind):
             inside = (z > 0.05) & (at >= 0).all(1) & (at < behind.shape[::-1]).all(1)
         u, v = at[inside].astype(int).T
         found, z = behind[v, u], z[inside]
-        # What lies clearly behind the other view's surface is hidden there; nothing may lie before it.
+        # Points clearly behind the other view's surface are hidden there; no point may lie in front of it.
         visible = (found > 0) & (z < found * 1.03)
         seen += visible.sum()
         agree += (np.abs(found - z)[visible] < 0.03 * z[visible]).sum()

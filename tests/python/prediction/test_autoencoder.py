@@ -128,7 +128,7 @@ def test_a_varied_frame_differs_from_its_target_by_noise_alone():
 
 def test_stills_are_crops_of_the_photographs(tmp_path):
     photo = np.zeros((90, 160, 3), np.uint8)
-    photo[..., 0] = 200  # blue, as OpenCV has it
+    photo[..., 0] = 200  # blue in the order of OpenCV
     cv2.imwrite(str(tmp_path / "blue.jpg"), photo)
     stills = read_stills(tmp_path, 5)
     assert stills.shape == (5, 64, 64, 3)

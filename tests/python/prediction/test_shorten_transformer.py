@@ -30,7 +30,7 @@ def clips_of(count=3, frames=6):
 
 @pytest.fixture
 def whole():
-    """Whose first layer of the context and second of the slices do nothing."""
+    """Returns a transformer with an idle first layer of the context and second layer of the slices."""
     torch.manual_seed(0)
     net = LatentTransformer(SHAPE).eval()
     with torch.no_grad():

@@ -1,4 +1,4 @@
-"""What the documentation names exists: commands, files, symbols, options. Guides begin with an image and a command."""
+"""Commands, files, symbols and options in the documentation exist. Guides begin with an image and a command."""
 
 import re
 import subprocess

@@ -113,7 +113,7 @@ TOOLS_MAY_INCLUDE = {
     "commands/prediction": {".", "arguments", "commands", "output"},
 }
 
-# What the tools compile in of sdk/src and sdk/app: there is one way to write a file that appears whole, and one to draw
+# Files of sdk/src and sdk/app that the tools compile: there is one way to write a file atomically, and one to draw
 # edges.
 COMPILED_IN = {
     ("sdk/tools/output/output_file.cpp", "core/files/atomic_file.h"),
@@ -155,7 +155,7 @@ def includes(path: Path) -> list[str]:
 
 
 def folder_of(path: Path) -> str:
-    """Of a file of sdk/src: its folder as MAY_INCLUDE names it."""
+    """Returns the folder of a file of sdk/src, by its name in MAY_INCLUDE."""
     return path.parent.relative_to(SRC).as_posix()
 
 
@@ -194,7 +194,7 @@ def test_no_include_goes_up_or_across():
 
 
 def test_the_folders_have_no_cycle():
-    """Of the layers as written, image with its two rooms and sources with its backends taken as one each."""
+    """The written layers; image with its two folders, and sources with its backends, count as one layer each."""
 
     def whole(folder: str) -> str:
         return folder.split("/")[0] if folder.startswith(("image", "sources")) else folder

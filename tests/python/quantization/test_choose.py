@@ -1,4 +1,4 @@
-"""What stays float is chosen by gain a byte, until the gate holds, and is written where it is read."""
+"""Float layers are chosen by gain a byte, until the threshold holds, and are written where they are read."""
 
 from pathlib import Path
 

@@ -60,7 +60,7 @@ def arguments(place, *more):
 
 
 def test_the_check_is_that_of_xxh3():
-    # Of nothing, seed 0, from the tests that come with xxHash.
+    # Hash of no bytes, seed 0, from the tests of xxHash.
     assert xxh3(b"") == 0x2D06800538D394C2
 
 

@@ -406,7 +406,7 @@ def test_points_behind_a_sparse_surface_are_hidden_and_a_slope_is_not():
     assert behind_after < behind_before / 4
     assert torch.equal(left[depths_of(keys) < 3], keys[depths_of(keys) < 3])
     assert torch.equal(without_occluded(keys, torch.inf), keys)
-    # What remains is the nearest of its block, or near it: by hand.
+    # A point that remains is the nearest of its block, or near it: computed by hand.
     depth = depths_of(keys).numpy()
     for row, column in np.argwhere(left.numpy() != NOTHING)[::17]:
         top, first = row - row % OCCLUSION_BLOCK_PX, column - column % OCCLUSION_BLOCK_PX

@@ -15,7 +15,7 @@ from Xlib.protocol import event
 
 
 class Hands:
-    """Of somebody before the window that `process` opens."""
+    """Hands of a person at the window that `process` opens."""
 
     def __init__(self, process: subprocess.Popen):
         self._process = process
@@ -26,7 +26,7 @@ class Hands:
         self.until(lambda: self._window.get_attributes().map_state == viewable, "a window on the screen")
 
     def until(self, condition, what: str, timeout_s: float = 60):
-        """What the condition gives once it is true; the window goes on meanwhile."""
+        """Returns the condition's value once it is true; the window continues meanwhile."""
         end_s = time.monotonic() + timeout_s
         while time.monotonic() < end_s:
             assert self._process.poll() is None, f"the demo ended: {self._process.stderr.read()}"

@@ -1,4 +1,4 @@
-"""What teachers say of a photograph with one person."""
+"""Labels of teachers for a photograph with one person."""
 
 import numpy as np
 

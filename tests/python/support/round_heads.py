@@ -1,4 +1,4 @@
-"""What the bundle of round heads sees a head in (tests/native/generate/make_round_heads.py): all that is not black."""
+"""Photos for the bundle of round heads (tests/native/generate/make_round_heads.py): all that is not black is a head."""
 
 from pathlib import Path
 

@@ -1,7 +1,7 @@
 """Runs the desktop demo on a display in memory, and the command line on the same frames, to compare what they show.
 
 `show` gives the demo's report and the screenshot; `map_frames` what the command line finds in the last of so many
-frames, and the frame itself. Pictures are BGR, as cv2 has them.
+frames, and the frame itself. Images are BGR, in the order of cv2.
 """
 
 import atexit
@@ -55,7 +55,7 @@ class Shown:
     screenshot: np.ndarray
 
     def rectangle(self, name: str) -> np.ndarray:
-        """What lies in the rectangle that the report calls picture_px or mesh_px."""
+        """Returns the part in the rectangle that the report calls picture_px or mesh_px."""
         x, y, width, height = self.report[name]
         return self.screenshot[y : y + height, x : x + width]
 
@@ -148,7 +148,7 @@ def last_frame(recording: Path) -> np.ndarray:
 
 @cache
 def part_colours() -> np.ndarray:
-    """Of the C API: uint8 [25, 3] BGR, 0 for the background."""
+    """Returns the colours of the C API: uint8 [25, 3] BGR, 0 for the background."""
     library = ctypes.CDLL(str(STAGE / "lib/libmaquette.so"))
     colours = np.zeros((25, 3), np.uint8)
     for part in range(25):

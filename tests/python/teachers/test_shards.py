@@ -101,7 +101,7 @@ def test_every_value_has_its_mirror_image():
     value = np.arange(256, dtype=np.uint8)
     once = mirror_iuv(np.stack([value, 0 * value, 0 * value], -1))[:, 0]
     assert np.array_equal(once[once], value)
-    # What a value leaves possible is mirrored with it.
+    # The possible parts of a value are mirrored with it.
     assert np.array_equal(POSSIBLE_PARTS[once][:, surface.MIRROR_PART], POSSIBLE_PARTS)
     assert once[REGION + 12] == REGION + 13
 

@@ -26,9 +26,9 @@ from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 
 HOST_FIGURES = ("camera_age_ms", "camera_processor_percent", "camera_close_ms", "camera_fault_noticed_ms",
                 "camera_fault_replug_ms", "camera_allocations")  # fmt: skip
-GUEST_FIGURES = ("camera_vivid_dropped_frames", "camera_vivid_fps", "camera_uvc_dropped_frames", "camera_uvc_fps",
+GUEST_METRICS = ("camera_vivid_dropped_frames", "camera_vivid_fps", "camera_uvc_dropped_frames", "camera_uvc_fps",
                  "camera_v4l2_allocations", "camera_noticed_ms", "camera_replug_ms", "camera_reopen_ms")  # fmt: skip
-METRICS = HOST_FIGURES + GUEST_FIGURES
+METRICS = HOST_FIGURES + GUEST_METRICS
 COUNTER = Path("benchmarks/count_allocations.c")
 STUB = "stub:pattern?live=1&size=640x480&fps=30"
 COUNTED = "stub:pattern?live=1&size=320x240&fps=400"
@@ -130,7 +130,7 @@ def measure_host(quick: bool) -> dict:
     return measured
 
 
-def host_figures(measured: dict) -> dict[str, float]:
+def host_metrics(measured: dict) -> dict[str, float]:
     counted = measured["allocations"]
     return {
         "camera_age_ms": statistics.median(run["age_ms"]["median"] for run in measured["stub"]),
@@ -151,7 +151,7 @@ def measure_guest(frames: int) -> tuple[dict, str]:
 
 
 def read_guest(output: str, status: int) -> tuple[dict, str]:
-    """Parses the lines `figure NAME JSON` of run.sh, with `outages` computed from `plug`. Also returns why some are
+    """Parses the lines `metric NAME JSON` of run.sh, with `outages` computed from `plug`. Also returns why some are
     missing.
 
     Raises ValueError for broken JSON.
@@ -159,7 +159,7 @@ def read_guest(output: str, status: int) -> tuple[dict, str]:
     lines = output.splitlines()
     metrics = {}
     for line in lines:
-        if line.startswith("figure "):
+        if line.startswith("metric "):
             _, name, text = line.split(" ", 2)
             metrics[name] = json.loads(text)
     failed = [line.removeprefix("not ok ") for line in lines if line.startswith("not ok ")]
@@ -176,7 +176,7 @@ def read_guest(output: str, status: int) -> tuple[dict, str]:
     return metrics, "; ".join(failed)
 
 
-def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], dict[str, str]]:
+def guest_metrics(said: dict, frames: int, why: str) -> tuple[dict[str, float], dict[str, str]]:
     """Returns the metrics, and why others are missing."""
     metrics = {}
     for camera in ("vivid", "uvc"):
@@ -190,7 +190,7 @@ def guest_figures(said: dict, frames: int, why: str) -> tuple[dict[str, float], 
     if "outages" in said:
         for name in ("noticed_ms", "replug_ms", "reopen_ms"):
             metrics[f"camera_{name}"] = statistics.median(outage[name] for outage in said["outages"])
-    return metrics, {name: why or "the guest did not say" for name in GUEST_FIGURES if name not in metrics}
+    return metrics, {name: why or "the guest did not say" for name in GUEST_METRICS if name not in metrics}
 
 
 def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float], dict[str, str]]:
@@ -198,8 +198,8 @@ def measure(quick: bool, with_guest: bool = True) -> tuple[dict, dict[str, float
     frames = 100 if quick else 1000
     host = measure_host(quick)
     said, why = measure_guest(frames) if with_guest else ({}, "left out by --no-guest")
-    found, missing = guest_figures(said, frames, why)
-    metrics = {name: round(value, 4) for name, value in (host_figures(host) | found).items()}
+    found, missing = guest_metrics(said, frames, why)
+    metrics = {name: round(value, 4) for name, value in (host_metrics(host) | found).items()}
     others = host["others_fraction"]
     warnings = [f"other processes used {others:.0%} of the CPU (cameras)"] if others > MAX_OTHERS else []
     return {"host": host, "guest": said, "guest_missing": why, "frames": frames, "warnings": warnings}, metrics, missing

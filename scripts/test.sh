@@ -45,7 +45,7 @@ run() {
             ;;
         tsan) built tsan && native tsan "$results/ctest-tsan.xml" -L threads ;;
         aarch64) scripts/test-isa.sh 1 core ;;
-        android) scripts/android/build.sh 1 && scripts/android/test.sh ;;
+        android) scripts/android/build.sh 1 arm64-v8a && scripts/android/test.sh ;;
         camera-vm) tests/camera_vm/run.sh ;;
     esac
 }
@@ -74,14 +74,26 @@ retry() {
     esac
 }
 
+# Sets cpu_s to the processor time of this shell's ended children, in seconds.
+measure_cpu() {
+    local file="$results/times-$$"
+    times >"$file"  # in a subshell it would be 0
+    cpu_s=$(awk 'NR == 2 { for (i = 1; i <= 2; ++i) { split($i, t, /[ms]/); s += 60 * t[1] + t[2] } printf "%.0f", s }' "$file")
+    rm "$file"
+}
+
 # builds NAME...: compiles asan, tsan.
 builds() {
-    local name targets
+    local name targets before=0
     for name; do
         targets=()
         [ "$name" = asan ] || targets=(thread_tests)
-        scripts/build.sh "$name" -DMAQ_BUILD_TESTS=ON ${targets[@]+"${targets[@]}"} >"$results/$name-build.log" 2>&1 &&
-            touch "$results/$name.built"
+        scripts/build.sh "$name" -DMAQ_BUILD_TESTS=ON ${targets[@]+"${targets[@]}"} >"$results/$name-build.log" 2>&1 ||
+            continue
+        touch "$results/$name.built"
+        measure_cpu
+        echo "# $name built after $SECONDS s, CPU time $((cpu_s - before)) s"
+        before=$cpu_s
     done
 }
 
@@ -95,9 +107,10 @@ built() {
 group() {
     local status=0 log="$results/$1.log"
     run "$1" >"$log" 2>&1 || status=$?
+    measure_cpu
     case "$1 $status" in
         "camera-vm 77" | "aarch64 77") echo "# $1 not run: $(tail -n 1 "$log")"; return ;;
-        *" 0") echo "# $1 passed in $SECONDS s"; grep -hE '^SKIPPED|\*\*\*(Skipped|Not Run)' "$log"; return 0 ;;
+        *" 0") echo "# $1 passed in $SECONDS s, CPU time $cpu_s s"; grep -hE '^SKIPPED|\*\*\*(Skipped|Not Run)' "$log"; return 0 ;;
     esac
     touch "$results/$1.failed"
     { echo; echo "== $1"; cat "$log"; echo "# $1 FAILED after $SECONDS s"; } | flock "$results" cat

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Builds the AAR where there is no NDK, as far as that goes, and checks it:
 #
-#   scripts/android/build.sh [JOBS]
+#   scripts/android/build.sh [JOBS] [ABI...]      default: all processors, and the ABIs arm64-v8a and x86_64
 #
-# Compiles and links the SDK and its Java side for arm64-v8a and x86_64 with Debian's clang (cmake/android-check.cmake),
+# Compiles and links the SDK and its Java side for each ABI with Debian's clang (cmake/android-check.cmake),
 # several files as one, a third of the time (tests/python/project/test_standard_headers.py finds the header one lacks);
 # the Kotlin API with Maven, and its classes to Android's own bytecode with D8; assembles
 # build/android/maquette-VERSION.aar with a report of its size beside it. Nothing of it was run on Android. What is
@@ -11,6 +11,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 jobs="${1:-$(nproc)}"
+abis=("${@:2}")
+[ ${#abis[@]} -gt 0 ] || abis=(arm64-v8a x86_64)
 case "$jobs" in
     -h | --help) sed -n '2,11s/^# \{0,1\}//p' scripts/android/build.sh; exit 0 ;;
     '' | *[!0-9]*) sed -n '2,11s/^# \{0,1\}//p' scripts/android/build.sh >&2; exit 2 ;;
@@ -23,7 +25,7 @@ if command -v ccache >/dev/null; then
     launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 native=()
-for abi in arm64-v8a x86_64; do
+for abi in "${abis[@]}"; do
     echo "== Native code for $abi"
     folder="build/android/$abi"
     cmake -G Ninja -S android/maquette/src/main/cpp -B "$folder" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING \

@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # Runs the camera tests: boots Debian's kernel in qemu, with test cameras, and programs against them.
 #
-#   tests/camera_vm/run.sh [vivid|uvc|sdk|libcamera|figures]...      default: all; the last three need `make build`
+#   tests/camera_vm/run.sh [vivid|uvc|sdk|libcamera|metrics]...      default: all; the last three need `make build`
 #
-# In the environment, FRAMES: how many figures takes from each camera (100).
+# In the environment, FRAMES: how many frames "metrics" takes from each camera (100).
 # Closes with "N passed, N failed"; results also in build/test-results/camera-vm.xml (JUnit), what the kernel said in
 # build/camera-vm. Exit status 77: it could not be run, and the last line says why.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 usage() { sed -n '2,9s/^# \{0,1\}//p' "$0"; }
 
-guests=(vivid uvc sdk libcamera figures)
+guests=(vivid uvc sdk libcamera metrics)
 frames="${FRAMES:-100}"
 limit_s=$((900 + frames / 2))  # for one guest; each takes up to two minutes where nothing else runs
 work=build/camera-vm
@@ -19,7 +19,7 @@ report=build/test-results/camera-vm.xml
 for argument in "$@"; do
     case "$argument" in
         -h | --help) usage; exit 0 ;;
-        vivid | uvc | sdk | libcamera | figures) ;;
+        vivid | uvc | sdk | libcamera | metrics) ;;
         *) usage >&2; exit 2 ;;
     esac
 done
@@ -75,7 +75,7 @@ pack() {
             contents+=(--module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
                 --program "$work/source_check" --program "$(command -v cam)" --program "$(command -v udevadm)"
                 --file tests/media/photo.jpg=photo.jpg --tree build/release/stage=/opt/maquette) ;;
-        figures) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
+        metrics) contents+=(--module vivid --module vhci-hcd --module uvcvideo --program "$work/virtual_uvc_camera"
             --file "$work/count_allocations.so=count_allocations.so" --tree build/release/stage=/opt/maquette) ;;
     esac
     tests/camera_vm/make-initramfs.sh "$work/$1.cpio" "${contents[@]}"
@@ -86,7 +86,7 @@ boot() {
     local kernel memory_mb processor=(-accel tcg,thread=multi -smp 2)
     # An instruction takes a nanosecond and waiting takes none of ours: however busy this machine is, times in the guest
     # come out alike.
-    [ "$1" != figures ] || processor=(-accel tcg,thread=single -icount "shift=0,sleep=off" -smp 1)
+    [ "$1" != metrics ] || processor=(-accel tcg,thread=single -icount "shift=0,sleep=off" -smp 1)
     kernel="$(echo .deps/camera-vm/root/boot/vmlinuz-*)"
     memory_mb=$((512 + 3 * $(stat -c %s "$work/$1.cpio") / 1048576))
     timeout "$limit_s" qemu-system-x86_64 "${processor[@]}" -cpu max -m "$memory_mb" \

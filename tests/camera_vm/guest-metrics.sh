@@ -1,12 +1,12 @@
-# Runs in the virtual machine: what maquette makes of cameras, in figures. Each is a line `figure NAME JSON`, which
+# Runs in the virtual machine: what maquette makes of cameras, as metrics. Each is a line `metric NAME JSON`, which
 # benchmarks/cameras.py reads. run.sh says whose seconds these are.
 
 export LD_LIBRARY_PATH=/opt/maquette/lib
 maquette=/opt/maquette/bin/maquette
 frames="${frames:-100}"  # asked of the kernel, which hands on what it does not know
 
-figure() {
-    [ ! -e "/tmp/$1.json" ] || echo "figure $1 $(tr -d '\n' <"/tmp/$1.json")"
+metric() {
+    [ ! -e "/tmp/$1.json" ] || echo "metric $1 $(tr -d '\n' <"/tmp/$1.json")"
 }
 
 # delivers NAME FRAMES URI
@@ -23,13 +23,13 @@ delivers_from_no_heap() {
     [ $delivered -eq 0 ] || return 1
     grep '"allocations": 0' "/tmp/$1_allocations.json"
 }
-# figures_of NAME URI: of many frames, and of few, so that the costs of starting can be taken off.
-figures_of() {
+# metrics_of NAME URI: of many frames, and of few, so that the costs of starting can be taken off.
+metrics_of() {
     check "$1: $frames frames, none lost, none allocated" delivers_from_no_heap "$1" "$2"
-    figure "$1"
-    figure "$1_allocations"
+    metric "$1"
+    metric "$1_allocations"
     check "$1: a few frames" delivers "$1_few" $((frames / 10)) "$2"
-    figure "$1_few"
+    metric "$1_few"
 }
 
 appears() {
@@ -71,10 +71,10 @@ plugs_again() {
 
 check "vivid loads" modprobe vivid n_devs=1 node_types=0x1
 # At 640x480 it has no 30 frames a second.
-figures_of vivid "v4l2:/dev/video0?size=640x360&fps=30"
+metrics_of vivid "v4l2:/dev/video0?size=640x360&fps=30"
 check "vivid at 640x480: a few frames, none lost" delivers vivid_640x480 $((frames / 10)) \
     "v4l2:/dev/video0?size=640x480&fps=30"
-figure vivid_640x480
+metric vivid_640x480
 rmmod vivid
 
 check "drivers of USB cameras load" sh -c 'modprobe vhci-hcd && modprobe uvcvideo'
@@ -82,7 +82,7 @@ virtual_uvc_camera &
 camera=$!
 check "the camera appears" wait_until test -e /dev/video0
 sleep 0.3
-figures_of uvc "v4l2:/dev/video0?size=640x480&fps=30"
+metrics_of uvc "v4l2:/dev/video0?size=640x480&fps=30"
 check "uvc: comes back five times" plugs_again
-figure plug
+metric plug
 kill $camera

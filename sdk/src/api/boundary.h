@@ -23,7 +23,7 @@ class ArgumentError : public Error {
 // begins the text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
 
-// The text of what a call on an object of the parent process returns, which is MAQ_ERROR_INVALID_ARGUMENT.
+// The text of MAQ_ERROR_INVALID_ARGUMENT, which calls on an object of the parent process return.
 extern const char kIsOfParent[];
 
 // The text of the handle, or the thread's latest for NULL; it stays until the thread calls this again.
@@ -80,8 +80,8 @@ maq_status guarded_alone(const T* handle, const char* name, const char* function
 
 enum class WhileInUse { kRefused, kAllowed };
 
-// For `_destroy`, `_close` and `_release`: `reclaim` gets the handle unless it is NULL. The app keeps what it cannot
-// give back: a handle of another type, one that was given back before, one with a call that runs.
+// For `_destroy`, `_close` and `_release`: `reclaim` gets the handle unless it is NULL. The app keeps handles that it
+// cannot give back: a handle of another type, one that was given back before, or one with a running call.
 template <class T, class Reclaim>
 void return_handle(T* handle, const char* name, const char* function, Reclaim&& reclaim,
                    WhileInUse while_in_use = WhileInUse::kRefused) noexcept {

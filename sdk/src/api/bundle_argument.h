@@ -11,7 +11,7 @@ namespace maq {
 
 // Reads the bundle in folder `path`; without one of `files`; without these the bundle `installed` of the folder
 // share/maquette/models beside the library. `config` is the name of the config that has them. Throws ArgumentError for
-// a path and files, or files without content, and what read_bundle throws.
+// a path and files, or files without content, and the errors of read_bundle.
 Bundle read_bundle_argument(const char* config, const char* path, const maq_memory_file* files, uint32_t file_count,
                             const char* installed);
 

@@ -1,4 +1,4 @@
-// Cameras of the C API to those of the SDK, and back.
+// Converts cameras of the C API to cameras of the engine, and back.
 #pragma once
 
 #include <algorithm>

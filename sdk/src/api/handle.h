@@ -41,7 +41,7 @@ class Handle {
   }
 
  private:
-  mutable HandleState state_;  // the first: it is read before it is known what the object is, if it is one
+  mutable HandleState state_;  // first: it is read before the type of the object is known
   mutable std::mutex mutex_;
   mutable std::string error_;
 };

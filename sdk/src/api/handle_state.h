@@ -83,7 +83,7 @@ class HandleState {
 
   bool has_mark() const { return (word_.load(std::memory_order_relaxed) & kMarkBits) == kMark; }
 
-  static constexpr uint32_t kMark = 0x4d510000, kMarkBits = 0xffff0000;  // unlike what memory is often filled with
+  static constexpr uint32_t kMark = 0x4d510000, kMarkBits = 0xffff0000;  // unlike common fill patterns of memory
   static constexpr uint32_t kInUse = 1, kGivenBack = 2, kPart = 4;
   static constexpr uint32_t held(HandleKind kind) { return kMark | uint32_t(kind) << 8; }
 

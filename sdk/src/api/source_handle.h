@@ -22,8 +22,8 @@ SourceSettings source_settings(const maq_source_config& config, const char* name
 struct maq_source : maq::HandleOf<maq::HandleKind::kSource> {
   maq_source(std::string opened, std::unique_ptr<maq::Source> made, size_t pool_size)
       : uri(std::move(opened)), source(std::move(made)), frames(pool_size, "frames") {}
-  // Calls of other threads for a frame end before, and a state callback: the app may free what that uses as soon as
-  // this returns, also where a concealer keeps the source.
+  // Calls of other threads for a frame end before, and a state callback: the app may free the callback's data as soon
+  // as this returns, even if a concealer keeps the source.
   ~maq_source() {
     stop();
     source->wait_for_report();

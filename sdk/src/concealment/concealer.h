@@ -32,7 +32,7 @@ class Concealer {
   Concealer(const Concealer&) = delete;
   Concealer& operator=(const Concealer&) = delete;
 
-  // The next frame, captured or predicted: Frame::origin says which. As Source::next; throws what that throws.
+  // The next frame, captured or predicted: Frame::origin says which. As Source::next; throws its errors.
   NextFrame next(int64_t timeout_ns, Frame& frame);
 
   ConcealerStats stats() const;  // from any thread

@@ -57,7 +57,7 @@ class BoundedPool {
   };
   using Pooled = std::unique_ptr<T, Deleter>;
 
-  // `what` names the pooled thing in the error text: "frames".
+  // `what` names the pooled objects in the error text: "frames".
   BoundedPool(size_t capacity, std::string what)
       : objects_(std::make_shared<PooledObjects>(capacity, std::move(what), destroy)) {}
 

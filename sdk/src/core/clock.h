@@ -16,8 +16,8 @@ inline int64_t to_ns(MonotonicClock::time_point time) {
 
 inline int64_t monotonic_ns() { return to_ns(MonotonicClock::now()); }
 
-// When a wait of `timeout_ns` from now ends. Beyond a century the sum would leave the clock's range, or that of the
-// system's clock, by which older C++ libraries wait.
+// When a wait of `timeout_ns` from now ends. Beyond a century the sum would leave the range of this clock, or of the
+// system's clock, which older C++ libraries use to wait.
 inline MonotonicClock::time_point deadline_after(int64_t timeout_ns) {
   constexpr int64_t kMaxTimeoutNs = int64_t(100) * 365 * 24 * 3600 * 1000000000;
   return MonotonicClock::now() + std::chrono::nanoseconds(std::min(timeout_ns, kMaxTimeoutNs));

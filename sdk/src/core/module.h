@@ -5,9 +5,9 @@
 // - A module throws an Error or an exception of the standard library, nothing else. Both sides are built together and
 //   share one C++ runtime; libstdc++ compares the types of exceptions by name, so that they match although the symbols
 //   of a module are private (RTLD_LOCAL).
-// - The exceptions of a foreign library (cv::Exception, those of DepthAI) are caught inside the module, and told as one
-//   of the above or by the function's result.
-// - What a thread of a foreign library, or C code, calls is noexcept.
+// - Exceptions of another library (cv::Exception, exceptions of DepthAI) are caught inside the module. They become an
+//   Error, an exception of the standard library, or a result of the function.
+// - Functions that a thread of another library, or C code, calls are noexcept.
 #pragma once
 
 #include <string>

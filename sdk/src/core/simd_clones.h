@@ -9,7 +9,7 @@
 // Sanitizers are not ready yet when the loader asks which version to take.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
-// flatten: what it calls must be inlined, or it would be compiled for any processor only.
+// flatten: called functions must be inlined; otherwise they would be compiled for any processor only.
 #define MAQ_SIMD_CLONES __attribute__((target_clones("avx2", "default"), flatten))
 #else
 #define MAQ_SIMD_CLONES
@@ -21,7 +21,7 @@ namespace maq {
 // whole part in the exponent and a polynomial (Taylor) for the rest, which lies within half a unit.
 inline float exp_of_negative(float x) {
   constexpr float kLog2E = 1.44269504f, kLn2 = 0.69314718f,
-                  kRound = 12582912.0f;  // 1.5 * 2^23: rounds what it is added to
+                  kRound = 12582912.0f;  // 1.5 * 2^23: rounds the number that it is added to
   const float scaled = x * kLog2E;
   const float whole = (scaled + kRound) - kRound;
   const float rest = (scaled - whole) * kLn2;

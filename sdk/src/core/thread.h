@@ -1,4 +1,4 @@
-// Starting threads: what the system says when it has no more of them is told as an Error.
+// Starts threads. If the system has no more threads, its answer becomes an Error.
 #pragma once
 
 #include <pthread.h>
@@ -28,8 +28,8 @@ std::thread start_thread(const char* name, Body&& body) {
   }
 }
 
-// Throws as start_thread() does where the system does not start so many threads now; for foreign libraries that hang,
-// or give another reason, where theirs do not start.
+// Throws as start_thread() does if the system does not start this many threads now; for foreign libraries that hang, or
+// give another reason, where theirs do not start.
 inline void require_threads(size_t count) {
   struct Held {
     ~Held() {

@@ -40,8 +40,8 @@ class WorkerThreads {
   int count() const { return int(threads_.size()) + 1; }
 
   // Calls work(task, worker) once for each task below `tasks`, in no order, with worker below count() and never twice
-  // at once for the same worker. Returns when all are done; throws what one of them threw, after which the rest is
-  // skipped. Not for two threads at once.
+  // at once for the same worker. Returns when all are done; throws the exception of one of them, after which the rest
+  // is skipped. Not for two threads at once.
   template <class Work>
   void run(size_t tasks, Work&& work) {
     run_with(

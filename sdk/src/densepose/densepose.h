@@ -80,7 +80,7 @@ class DensePose {
   void map_image(const ImageView& image, DensePoseResult& result);
   // Decides whether the image is a key frame, and how the networks see it.
   void begin_frame(const ImageView& image, DensePoseStats& stats);
-  // Maps the people in these boxes, then in crops those who gain by one; into `mapped_`.
+  // Maps the people in these boxes, then crops of the people who gain by one; into `mapped_`.
   void map_people(const ImageView& image, const std::vector<ScoredBox>& found, DensePoseStats& stats);
   void drop_unlikely();
   void sort_by_score();  // `mapped_`, best first
@@ -89,7 +89,7 @@ class DensePose {
 
   DensePoseSpec spec_;
   bool measures_threads_;
-  DensePoseSettings settings_;  // resolved: no 0 stands for the bundle's value, and threads are those in use
+  DensePoseSettings settings_;  // resolved: with the bundle's values for defaults, and the threads in use
   std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<PersonDetector> detector_;
   std::unique_ptr<SurfaceMapper> mapper_;

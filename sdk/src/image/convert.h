@@ -10,8 +10,8 @@
 namespace maq {
 
 // The image as BGR8: of the same memory when it is BGR8 already, otherwise a converted copy in `memory`, which the
-// caller keeps so that the next image takes nothing from the heap. YUV is that of BT.601 in video range, in the
-// fixed-point arithmetic of OpenCV's cvtColor. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
+// caller keeps so that the next image takes nothing from the heap. YUV is BT.601 in video range, in the fixed-point
+// arithmetic of OpenCV's cvtColor. Throws MAQ_ERROR_UNSUPPORTED for a depth image.
 ImageView as_bgr(const ImageView& image, std::vector<uint8_t>& memory);
 
 // From one row of a caller's memory to the next: `stride_bytes`, or of rows without padding where that is 0. Throws

@@ -26,7 +26,7 @@ struct NetworkInputSpec {
 struct ResizeAxis {
   int from_px = 0;
   int to_px = 0;
-  int taps = 0;               // weights of a new pixel; those that it does not need are zero
+  int taps = 0;               // weights of a new pixel; unneeded ones are zero
   std::vector<int> first;     // [to_px]; first + taps <= from_px
   std::vector<float> weight;  // [to_px, taps]
 

@@ -1,4 +1,4 @@
-// An image that a renderer makes, of a scene or of a mesh, and what it knows of each pixel.
+// A rendered image of a scene or a mesh, with depth and more for each pixel.
 #pragma once
 
 #include <cstdint>

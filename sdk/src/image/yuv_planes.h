@@ -25,7 +25,7 @@ struct YuvImage {
   bool is_full_range = true;  // all values from 0 to 255 (JFIF, BT.601), or the video range
 };
 
-// Why the planes are not those of an image of that size; nothing when they are.
+// Returns the reason why the planes do not fit an image of that size; nothing if they fit.
 std::optional<std::string> yuv_image_problem(const YuvImage& image);
 
 // Writes the image, rotated by 90 degrees clockwise so often (0 to 3), as NV12 without padding, packed_bytes() long, in

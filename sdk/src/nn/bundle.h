@@ -33,8 +33,8 @@ struct NamedBuffer {
 // weights in another file. Files that the manifest does not list are not read.
 Bundle read_bundle(const std::string& folder);
 
-// Reads buffers in any order and copies them. Throws MAQ_ERROR_INVALID_ARGUMENT for a buffer without a name or
-// data, and for two of one name; MAQ_ERROR_NOT_FOUND where none is "manifest.json"; else what the folder's throws.
+// Reads buffers in any order and copies them. Throws MAQ_ERROR_INVALID_ARGUMENT for a buffer without a name or data,
+// and for two of one name; MAQ_ERROR_NOT_FOUND if none is "manifest.json", and the errors of reading a folder.
 Bundle read_bundle(const std::vector<NamedBuffer>& buffers);
 
 }  // namespace maq

@@ -41,17 +41,16 @@ struct Manifest {
   std::map<std::string, GraphSpec> graphs;
   ManifestNode root;
 
-  // For systems to check what they find. Throw MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE
-  // where a graph is missing.
+  // For systems that check their own keys. Throw MAQ_ERROR_UNSUPPORTED for a bundle of another task,
+  // MAQ_ERROR_BAD_BUNDLE where a graph is missing.
   void require_task(const std::string& wanted) const;
   void require_graphs(const std::vector<std::string>& names) const;
   // The file that a node names. Throws MAQ_ERROR_BAD_BUNDLE when "files" does not list it.
   std::string listed_file(const ManifestNode& node) const;
 };
 
-// Reads the text of a manifest. `origin` names it in errors.
-// Throws MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong type or out of range, and MAQ_ERROR_UNSUPPORTED for
-// another format version.
+// Reads the text of a manifest. `origin` names it in errors. Throws MAQ_ERROR_BAD_BUNDLE for a value that is missing,
+// of the wrong type or out of range, and MAQ_ERROR_UNSUPPORTED for another format version.
 Manifest parse_manifest(const std::string& text, const std::string& origin);
 
 }  // namespace maq

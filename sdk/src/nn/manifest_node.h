@@ -1,4 +1,4 @@
-// A value in a manifest that is read with its path, so that each error names what is wrong: "rpn.strides[2]".
+// A value in a manifest that is read with its path, which each error names: "rpn.strides[2]".
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ class ManifestNode {
   // object.
   static ManifestNode parse(const std::string& text, const std::string& origin);
 
-  // Throws MAQ_ERROR_BAD_BUNDLE: the file, the path, then what is wrong with it.
+  // Throws MAQ_ERROR_BAD_BUNDLE: the file, the path, then the fault.
   template <class... Parts>
   [[noreturn]] void fail(const Parts&... parts) const {
     throw Error(MAQ_ERROR_BAD_BUNDLE, document_->origin, ": \"", path_, "\" ", parts...,

@@ -1,5 +1,6 @@
-// Execution providers: what may run the nodes of a graph in place of ONNX Runtime's own kernels. One that a build of
-// ONNX Runtime does not have, or that takes too little of a graph, costs a line in the log and not the app's run.
+// Execution providers: libraries that may run the nodes of a graph instead of ONNX Runtime's own kernels. One that a
+// build of ONNX Runtime does not have, or that takes too little of a graph, costs a line in the log and not the app's
+// run.
 #pragma once
 
 #include <string>

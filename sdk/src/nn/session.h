@@ -54,7 +54,7 @@ struct SessionSettings {
   // Whether memory is planned for each size of input after its first run. With inputs of many sizes, or large ones,
   // that takes more than it saves.
   bool plans_memory = true;
-  // Runs what it can of the graph; where it cannot be used, or takes too little, the session is as with the CPU.
+  // Runs the nodes that it supports; if it is missing or takes too few nodes, the session runs on the CPU.
   maq_provider provider = MAQ_PROVIDER_CPU;
 };
 
@@ -94,8 +94,8 @@ class Session {
   // Runs the network on its inputs, in the order of the spec. The outputs, of the shapes that the caller expects and in
   // the order of the spec, lie in memory of the session and stay until the next run. Not for two threads at once.
   // Throws MAQ_ERROR_INFERENCE, also when an output has another shape; MAQ_CANCELLED, between two nodes of the graph,
-  // where `cancel` says so. `first_output`: memory for the first output instead of the session's; that of an input
-  // where the graph has read this before it writes.
+  // where `cancel` says so. `first_output`: memory for the first output instead of the session's. It may be an input's
+  // memory if the graph reads that input before it writes.
   const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
                                      const RunCancel* cancel = nullptr, float* first_output = nullptr);
 

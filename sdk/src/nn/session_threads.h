@@ -17,7 +17,7 @@ class SessionThreads {
  public:
   // Starts `count` threads, or as many as the system gives; none where a limit of the address space is near.
   explicit SessionThreads(int count);
-  // Ends those that were not assigned.
+  // Ends threads that were not assigned.
   ~SessionThreads();
   SessionThreads(const SessionThreads&) = delete;
   SessionThreads& operator=(const SessionThreads&) = delete;

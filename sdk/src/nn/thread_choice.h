@@ -21,7 +21,7 @@ using TimedRun = std::function<void()>;
 // Measures 1 to `max_threads` threads and chooses. `open` makes what is to run on so many, which is gone afterwards.
 // After a run of each that does not count, they run in turn, so that a busy moment or a clock that rises meets all of
 // them: nine times each, or as often as fits into half a second, but once at least. Of one thread nothing is opened.
-// Throws what one thread throws; numbers that throw are not chosen.
+// Throws the exception of one thread; numbers that throw are not chosen.
 int measure_threads(int max_threads, const std::function<TimedRun(int threads)>& open);
 
 // A network and the input of one size that it is measured with; SizedSessions has the meanings of the first five.

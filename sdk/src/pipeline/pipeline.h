@@ -54,7 +54,7 @@ class Pipeline {
   ~Pipeline();
 
   void set_source(const std::string& uri);
-  // nullptr: no model runs. Throws what LiveModel::use_for() throws.
+  // nullptr: no model runs. Throws the errors of LiveModel::use_for().
   void set_model(const std::shared_ptr<LiveModel>& model);
   void set_paused(bool is_paused);
   void set_recording(const std::string& path);  // "": ends the recording

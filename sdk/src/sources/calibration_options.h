@@ -1,4 +1,4 @@
-// The options of a source's URI that say what its pixels mean: "?fov=60" or "?fx=380&fy=381&cx=318&cy=242" give the
+// The options of a source's URI with the meaning of its pixels: "?fov=60" or "?fx=380&fy=381&cx=318&cy=242" give the
 // intrinsics, "?depth_unit=0.001" the unit of depth.
 #pragma once
 
@@ -13,7 +13,7 @@ namespace maq {
 constexpr char kCalibrationOptions[] = "fov, fx, fy, cx, cy";
 
 // Takes "depth_unit" off the list: metres of 1 in stored depth; nothing when it was not given. Throws
-// MAQ_ERROR_INVALID_ARGUMENT for what is none.
+// MAQ_ERROR_INVALID_ARGUMENT for an invalid value.
 std::optional<double> take_depth_unit(SourceUri& uri);
 
 // The calibration options. The size of the images is known when the source is open.

@@ -45,12 +45,12 @@ struct CameraBuffer {
   FrameOrigin origin;                            // origin in a replayed recording
   int slot = 0;
   int64_t timestamp_ns = 0;  // CLOCK_MONOTONIC, when the image was taken; no later than the one before: it is dropped
-  uint32_t sequence = 0;     // counts the device's frames, those that were lost included
+  uint32_t sequence = 0;     // counts the device's frames, including lost ones
   bool damaged = false;      // the device says that pixels are missing
   uint32_t seeks = 0;        // how often Camera::seek took effect before this frame
 };
 
-// A control and what it was set to.
+// A control and its set value.
 struct ControlSetting {
   maq_source_control which;
   double value;
@@ -65,8 +65,8 @@ class Camera : public FrameOwner {
   virtual const std::string& identity() const = 0;
   // Null when the device does not know.
   virtual const maq_intrinsics* intrinsics() const { return nullptr; }
-  // From any thread. Throw MAQ_ERROR_UNSUPPORTED for what the device does not have, MAQ_ERROR_INVALID_ARGUMENT for
-  // values out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
+  // From any thread. Throw MAQ_ERROR_UNSUPPORTED for a control that the device does not have,
+  // MAQ_ERROR_INVALID_ARGUMENT for values out of range, MAQ_ERROR_BUSY, MAQ_ERROR_DEVICE_LOST.
   virtual maq_source_control_info control(maq_source_control which);
   virtual void set_control(maq_source_control which, double value);
   // From any thread, of a replay: the next frame is the first at that time or later.
@@ -78,7 +78,7 @@ class Camera : public FrameOwner {
   virtual void close() = 0;
 };
 
-// A connected camera, and what it offers.
+// A connected camera and its modes.
 struct CameraMode {
   std::string format;   // four letters: "YUYV"
   bool usable = false;  // whether this build understands the format

@@ -11,8 +11,8 @@ namespace maq {
 // For the list of options that a source knows.
 constexpr char kControlOptions[] = "exposure, gain, focus, white_balance and brightness";
 
-// Takes those options off the list: what is to be set, in this order. LiveSource sets it.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for what is neither a number nor "auto".
+// Removes the controls from the list of options and returns them, in this order. LiveSource sets them. Throws
+// MAQ_ERROR_INVALID_ARGUMENT for a value that is neither a number nor "auto".
 std::vector<ControlSetting> take_control_options(SourceUri& uri);
 
 }  // namespace maq

@@ -14,7 +14,7 @@ namespace maq {
 
 class LiveSource : public Source {
  public:
-  // Opens the camera at once and sets `controls`, and throws what they throw. `name` begins error texts. A calibration
+  // Opens the camera at once and sets `controls`, and throws their errors. `name` begins error texts. A calibration
   // that is given goes before the camera's own.
   LiveSource(CameraOpener open, std::string name, const SourceSettings& settings,
              const std::vector<ControlSetting>& controls = {}, const CalibrationOptions& calibration = {});

@@ -23,8 +23,8 @@ const std::vector<SourceScheme>& source_schemes();
 // The cameras that are connected now.
 std::vector<CameraListing> list_cameras();
 
-// A URI, or the path of a file or a camera (/dev/video0): of those every character is part of the name.
-// Throws MAQ_ERROR_UNSUPPORTED for a scheme that is not in the list, and what the source throws.
+// A URI, or the path of a file or a camera (/dev/video0): in a path every character is part of the name. Throws
+// MAQ_ERROR_UNSUPPORTED for a scheme that is not in the list, and the errors of the source.
 std::unique_ptr<Source> open_source(const std::string& uri, const SourceSettings& settings = {});
 
 }  // namespace maq

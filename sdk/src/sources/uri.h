@@ -25,7 +25,7 @@ struct SourceUri {
   double take_number(const std::string& key, double fallback, double min, double max);
   // "" when it was not given.
   std::string take_text(const std::string& key) { return take(key).value_or(""); }
-  // Throws MAQ_ERROR_INVALID_ARGUMENT when an option is left over. `known` lists those that the source has.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT when an option is left over. `known` lists the source's options.
   void expect_no_more_options(const std::string& known) const;
 
  private:

@@ -1,4 +1,4 @@
-// Converts structs of the C API for scenes to those of the engine.
+// Converts structs of the C API for scenes to structs of the engine.
 #pragma once
 
 #include <algorithm>

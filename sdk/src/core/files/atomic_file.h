@@ -20,8 +20,8 @@ class AtomicFile {
   // else: a folder, a disk. `temporary_extension` ends the temporary name, for libraries that choose a format by it;
   // with one, `path` must be a file.
   explicit AtomicFile(std::string path, const char* temporary_extension = "");
-  // Removes what was written, unless commit() was called. A process that dies before leaves the temporary file behind:
-  // its name is that of the file with ".part-" and 16 random digits.
+  // Removes the temporary file, unless commit() was called. A process that dies before leaves the temporary file
+  // behind: the file's name with ".part-" and 16 random digits.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

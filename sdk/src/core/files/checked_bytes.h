@@ -24,13 +24,12 @@ inline constexpr size_t kCheckedFrom = offsetof(FileStart, file_bytes);
 
 class CheckedBytes {
  public:
-  // `name` begins each sentence: "prior.maqp". `damage`: the status of what cannot be used. The bytes stay the
-  // caller's.
+  // `name` begins each sentence: "prior.maqp". `damage`: the status for unusable bytes. The bytes stay the caller's.
   CheckedBytes(const void* bytes, size_t count, std::string name, maq_status damage)
       : bytes_(static_cast<const uint8_t*>(bytes)), left_(count), name_(std::move(name)), damage_(damage) {}
 
-  // Reads a head, and checks the start of the file and its checksum. `kind`: "a prior of heads (.maqp)". `remedy`: what
-  // to do about another version. Throws `damage`, and MAQ_ERROR_UNSUPPORTED for another version.
+  // Reads a head, and checks the start of the file and its checksum. `kind`: "a prior of heads (.maqp)". `remedy`: the
+  // remedy for another version. Throws `damage`, and MAQ_ERROR_UNSUPPORTED for another version.
   template <class Head>
   Head head(const char (&magic)[8], uint32_t version, const char* kind, const char* remedy) {
     check_start(magic, version, sizeof(Head), kind, remedy);
@@ -69,7 +68,7 @@ class CheckedBytes {
 
  protected:
   const uint8_t* take(size_t count);
-  // Throws before memory is taken for what is not there.
+  // Throws before it takes memory for missing bytes.
   void require_left(size_t count, size_t size_of_one) const {
     if (count > left_ / size_of_one) fail(" ends before what its head claims.");
   }

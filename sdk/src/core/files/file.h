@@ -29,11 +29,11 @@ struct OpenFile {
 // be read or is something else: a folder, a pipe, a device.
 OpenFile open_file(const std::string& path);
 
-// Throws what is wrong with the first bytes of a file.
+// Throws an error for wrong first bytes of a file.
 using StartCheck = std::function<void(const std::vector<uint8_t>& start)>;
 
-// Reads a regular file, or a pipe such as /dev/stdin, to its end. `check_start` gets its first 64 KiB, or the whole of
-// what is shorter, before more is read. Throws the errors of open_file(), and MAQ_ERROR_UNREADABLE when there are more
+// Reads a regular file, or a pipe such as /dev/stdin, to its end. `check_start` gets the first 64 KiB, or a whole
+// shorter file, before more is read. Throws the errors of open_file(), and MAQ_ERROR_UNREADABLE when there are more
 // than `max_bytes`, no program writes to the pipe, or its writer gives nothing for 10 seconds.
 std::vector<uint8_t> read_file(const std::string& path, uint64_t max_bytes, const StartCheck& check_start = {});
 

@@ -54,7 +54,7 @@ class FileReader {
   // MAQ_ERROR_UNREADABLE when it is longer than any number.
   std::string_view next_word();
 
-  // Throws MAQ_ERROR_UNREADABLE: the path, then what is wrong.
+  // Throws MAQ_ERROR_UNREADABLE: the path, then the fault.
   template <class... Parts>
   [[noreturn]] void fail(const Parts&... parts) const {
     throw Error(MAQ_ERROR_UNREADABLE, path_, parts...);
@@ -75,7 +75,7 @@ class FileReader {
   bool ended_line_ = true;
 };
 
-// Reads the whole text as a number, in the C locale whatever that of the process; false when it is not one.
+// Reads the whole text as a number, in the C locale, whatever the locale of the process; false if it is not a number.
 bool parse_number(std::string_view text, double& number);
 
 }  // namespace maq

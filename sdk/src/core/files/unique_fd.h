@@ -16,7 +16,7 @@ namespace maq {
 class UniqueFd {
  public:
   UniqueFd() = default;
-  // Takes what open() and its like return: -1 for none.
+  // Takes a file descriptor, as open() returns it: -1 for none.
   explicit UniqueFd(int fd) : fd_(fd) {}
   UniqueFd(UniqueFd&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   UniqueFd& operator=(UniqueFd&& other) noexcept {

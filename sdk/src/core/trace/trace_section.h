@@ -1,4 +1,4 @@
-// Sections in Android's traces (Perfetto, systrace): what the threads of the library do, stage by stage.
+// Sections in Android's traces (Perfetto, systrace): the work of the library's threads, stage by stage.
 #pragma once
 
 namespace maq {

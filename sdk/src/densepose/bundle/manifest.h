@@ -55,28 +55,28 @@ struct DensePoseSpec {
   DenseHeadSpec dense_head;
   std::string charts_file;
   std::string surface_file;      // "" when the bundle has none
-  std::string crop_charts_file;  // "" when crops go through the networks of the whole picture
+  std::string crop_charts_file;  // "" if crops use the networks of the whole image
 };
 
-// Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE for what is missing, of the wrong
-// type or out of range.
+// Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, and MAQ_ERROR_BAD_BUNDLE for a value that is missing, of
+// the wrong type or out of range.
 DensePoseSpec read_densepose_spec(const Manifest& manifest);
 
 // Its graphs, as the runtime uses them: tensors by name, with shapes that fit the manifest's other values. All of these
-// throw MAQ_ERROR_BAD_BUNDLE for what is missing or other.
+// throw MAQ_ERROR_BAD_BUNDLE for a missing or different value.
 constexpr int64_t kAnySize = -1;
 
 // Names of tensors at the levels from `first` to `last`: "p3", "p4", …
 std::vector<std::string> at_levels(const std::string& name, int first, int last);
 
-// A graph with those of its tensors that are called so, in this order; the manifest may list more, in any order.
+// A graph with its tensors of these names, in this order; the manifest may list more, in any order.
 GraphSpec graph_with(const Manifest& manifest, const std::string& graph, const std::vector<std::string>& inputs,
                      const std::vector<std::string>& outputs);
 
 // Returns the channels of P2, the first output of a trunk; all levels have as many.
 int feature_channels(const GraphSpec& trunk, const std::string& bundle_name);
 
-// The shapes of all inputs, and of the outputs, of which the last shape is that of all further ones. Where the manifest
+// The shapes of all inputs and outputs. The last output shape also counts for all further outputs. Where the manifest
 // has a name for a size that must be known, the tensor gets the number, so that Session compares it with the graph.
 // `where` begins an error's text.
 void require_shapes(GraphSpec& graph, const std::vector<int64_t>& input,

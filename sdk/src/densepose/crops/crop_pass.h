@@ -49,7 +49,7 @@ class CropPass {
   // confident; then the person loses the crop. Returns the number of crops; `*provider` is set if there are any.
   int run(const ImageView& image, std::vector<MappedPerson>& people, RunCancel& cancel, maq_provider* provider);
   // Gives a person who was just painted the crop for the next frame, and between key frames a new box. `painted` holds
-  // the classified cells of the answer; the sizes are those of the image.
+  // the classified cells of the answer; the sizes are the image's.
   void follow(MappedPerson& person, bool is_key_frame, int width_px, int height_px, const Point& up,
               const DecodeMemory& painted) const;
 

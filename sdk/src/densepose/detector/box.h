@@ -21,7 +21,7 @@ struct Box {
 // Each is divided by its weight first; dw and dh are clamped at log(1000/16). NaN in gives NaN out.
 Box apply_deltas(const Box& box, const float deltas[4], const std::array<float, 4>& weights);
 
-// Clips to [0, width] x [0, height]. False when what is left is NaN or has no area: such a box is dropped.
+// Clips to [0, width] x [0, height]. Returns false if the rest is NaN or has no area: such a box is dropped.
 bool clip_box(Box& box, float width, float height);
 
 // Intersection over union; 0 for boxes without area.

@@ -26,7 +26,7 @@ struct DetectorStats {
 
 class PersonDetector {
  public:
-  // The settings are resolved: no 0 stands for the bundle's value. `spec` and `settings` must outlive this.
+  // The settings are resolved: defaults are replaced by the bundle's values. `spec` and `settings` must outlive this.
   PersonDetector(const DensePoseNetworks& networks, const DensePoseSpec& spec, const DensePoseSettings& settings);
 
   // Finds people in the image as `seen` shows it, with scores above `min_score`, best first, in pixels of the network's
@@ -36,7 +36,7 @@ class PersonDetector {
                                     const std::vector<ScoredBox>* followed, float min_score, RunCancel& cancel,
                                     DetectorStats& stats);
 
-  // Its features are those of the latest image.
+  // It has the features of the latest image.
   Trunk& trunk() { return trunk_; }
 
  private:

@@ -16,8 +16,8 @@ struct RotatedInput {
   Point up{0, -1};     // in the image, a unit vector
 };
 
-// Returns the input for an image that shows the world rotated clockwise by so many steps. Its longer side becomes
-// `long_side_px`; a rotated one keeps that scale, and the input is as large as what lies around all of it.
+// Returns the input for an image that shows the world rotated clockwise by `roll_steps`. The longer side of the image
+// becomes `long_side_px`; a rotated image keeps this scale, and the input is the bounding box of the rotated image.
 RotatedInput rotated_input(int width_px, int height_px, int long_side_px, int roll_steps);
 
 }  // namespace maq

@@ -20,7 +20,7 @@ class ChartValues {
 };
 
 // The last layer of the dense head for U and V: a transposed convolution (kernel 4, stride 2, padding 1) over the
-// features `surface`. Each cell has 24 parts' values, of which one is used, so they are computed one by one.
+// features `surface`. Each cell has values of 24 parts, but only one is used: values are computed one by one.
 class ChartPredictor : public ChartValues {
  public:
   // `bytes`: float32 weight [2 (U, V), parts, 4, 4, channels], then bias [2, parts]. `name` names them in errors.

@@ -14,7 +14,7 @@ namespace maq {
 // The dense head's output for one person.
 struct DenseLogits {
   // [size / 2, size / 2, 2, 2, coarse_classes + index_classes]: four neighbouring cells (rows, then columns) lie
-  // together. Class 0 of both kinds is background (that of the index is not read), then come the parts.
+  // together. Class 0 of both kinds is background (the background logit of the index is not read), then come the parts.
   const float* labels = nullptr;
   ChartValues* charts = nullptr;  // U and V of the parts; null: they stay 0
   int coarse_classes = 0;
@@ -77,13 +77,13 @@ float min_log_odds(float mask_threshold);
 // Paints where the coarse classes other than background together have a probability above `mask_threshold` (log-odds of
 // each cell, resized bilinearly with half-pixel centres to the box's pixels): the best part of the index logits,
 // resized alike (of equal ones the lowest; background is not among them), with its U and V, resized alike and clamped
-// to [0, 1]. Pixels that already belong to a person, and those outside the image, are left alone; where less than
+// to [0, 1]. Pixels that already belong to a person, and pixels outside the image, are left alone; if less than
 // `min_visible_fraction` of the person's pixels remains, nothing is painted. `person` counts from 1.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
                           float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
 
-// Paints a person whose box is rotated in the image, like paint_person(): `to_cells` takes places of the image to the
-// cells of the logits, of which cell (0, 0) covers [0, 1) x [0, 1). Paints the pixels whose centres lie in the cells.
+// Paints a person with a box that is rotated in the image, like paint_person(): `to_cells` maps positions of the image
+// to the cells of the logits; cell (0, 0) covers [0, 1) x [0, 1). Paints the pixels whose centres lie in the cells.
 DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
                                   float mask_threshold, float min_visible_fraction, DecodeMemory& memory,
                                   DensePlanes& planes);

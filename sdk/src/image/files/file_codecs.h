@@ -38,7 +38,7 @@ class ClipDecoder {
   // Goes to a frame near that time, before or after it. False where this clip cannot.
   virtual bool seek_ms(double time_ms) = 0;
   // The next frame, BGR8 or GREY8, valid until the next call. False after the last that can be decoded. `image` has no
-  // pixels where those of the frame are of another kind.
+  // pixels if the frame's pixels are of another kind.
   virtual bool read(ImageView& image) = 0;
 };
 
@@ -57,7 +57,7 @@ class ClipEncoder {
 class FileCodecs {
  public:
   virtual ~FileCodecs() = default;
-  // A PNG, WebP, BMP or TIFF image, as it is stored, as BGR8; no width for what is damaged.
+  // A PNG, WebP, BMP or TIFF image, as it is stored, as BGR8; no width for a damaged image.
   virtual DecodedImage decode_image(const EncodedBytes& bytes, ImageFormat format) const = 0;
   // `extension`: ".png" or ".jpg"; the image is BGR8, GREY8 or, for PNG, RGBA8. False where it cannot be encoded.
   virtual bool encode_image(const std::string& extension, const ImageView& image,
@@ -67,7 +67,7 @@ class FileCodecs {
   virtual DecodedImage decode_depth(const EncodedBytes&, ImageFormat) const { refuse_depth(); }
   // DEPTH16 as ".png", DEPTH32F as ".tiff". False where it cannot be encoded.
   virtual bool encode_depth(const std::string&, const ImageView&, std::vector<uint8_t>&) const { refuse_depth(); }
-  // Null for what is damaged or no video.
+  // Null for a file that is damaged or not a video.
   virtual std::unique_ptr<ClipDecoder> open_clip(const std::string& path) const = 0;
   // `path` ends in .mp4 or .avi, like the format; sides are even. Null where this OpenCV does not write such clips.
   virtual std::unique_ptr<ClipEncoder> begin_clip(const std::string& path, ClipFormat format, double fps, int width_px,
@@ -80,8 +80,8 @@ class FileCodecs {
 };
 
 // Opens libmaquette_files.so at the first call. Throws MAQ_ERROR_RUNTIME_LIBRARY where it is missing or of another
-// build. Its codecs throw std::bad_alloc where they fail and there is too little memory. Where the codecs are linked in
-// (tests), it is those.
+// build. Its codecs throw std::bad_alloc where they fail and there is too little memory. If the codecs are linked in
+// (tests), returns them.
 const FileCodecs& file_codecs();
 
 // The export of the library, a FileCodecs (core/module.h).

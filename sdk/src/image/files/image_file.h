@@ -14,16 +14,15 @@ namespace maq {
 // Whether an image is rotated as its EXIF orientation says or left as it is stored.
 enum class Orientation { kUpright, kAsStored };
 
-// Throws the errors of decode_image() for what cannot be decoded, as far as the first bytes of an encoded image tell.
-// `origin` names it in errors.
+// Throws the errors of decode_image() that the first bytes of an encoded image show. `origin` names it in errors.
 void check_image_start(const EncodedBytes& start, const std::string& origin);
 
 // A file or a pipe, still encoded, whose first bytes were checked. Throws the errors of read_file() too.
 std::vector<uint8_t> read_encoded_image(const std::string& path);
 
 // Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR, with its origin. `origin` names it
-// in errors. Throws MAQ_ERROR_UNREADABLE for what is damaged, truncated or no image, MAQ_ERROR_UNSUPPORTED for other
-// formats, MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, the errors of file_codecs().
+// in errors. Throws MAQ_ERROR_UNREADABLE for a file that is damaged, truncated or not an image, MAQ_ERROR_UNSUPPORTED
+// for other formats, MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, the errors of file_codecs().
 void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame,
                   Orientation orientation = Orientation::kUpright);
 

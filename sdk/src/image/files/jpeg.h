@@ -1,4 +1,4 @@
-// JPEG images: those that cameras send, and photos. By libjpeg-turbo (jpeg.cpp) or by Android (android/).
+// JPEG images: images from cameras, and photos. By libjpeg-turbo (jpeg.cpp) or by Android (android/).
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,8 @@ class JpegDecoder {
   JpegDecoder(const JpegDecoder&) = delete;
   JpegDecoder& operator=(const JpegDecoder&) = delete;
 
-  // Into `frame`, as BGR8. False for what is damaged, truncated, over the limits of frame.h, or of more than
-  // `max_pixels`. Throws std::bad_alloc.
+  // Into `frame`, as BGR8. Returns false for an image that is damaged, truncated, over the limits of frame.h, or of
+  // more than `max_pixels`. Throws std::bad_alloc.
   bool decode(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame);
 
  private:

@@ -1,5 +1,5 @@
-// The mark of predicted frames in image files: a comment (JPEG) or a text chunk (PNG) at the beginning, which says what
-// maq_frame_get_origin says.
+// The mark of predicted frames in image files: a comment (JPEG) or a text chunk (PNG) at the beginning, with the
+// content of maq_frame_get_origin.
 #pragma once
 
 #include <cstdint>

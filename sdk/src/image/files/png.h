@@ -1,4 +1,4 @@
-// PNG images, by libpng itself: OpenCV lets it write what it thinks of a file to stderr.
+// PNG images, by libpng itself: OpenCV lets it write messages about a file to stderr.
 #pragma once
 
 #include <cstddef>

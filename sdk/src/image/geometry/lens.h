@@ -43,9 +43,9 @@ class LensProjection {
 
 // The lens without distortion for an undistorted image of the same size and principal point. Its focal lengths are
 // multiplied by the smallest factor with which every pixel of the new image comes from inside of the old one: nothing
-// is blank, what is seen at the edges only in part is lost (as OpenCV's getOptimalNewCameraMatrix with alpha 0). It
-// reaches at most 60 degrees from the axis. Nothing where there is no such factor up to 16: the principal point is
-// outside of the image, or the distortion is not invertible in it.
+// is blank, and parts at the edges are lost (as OpenCV's getOptimalNewCameraMatrix with alpha 0). It reaches at most 60
+// degrees from the axis. Nothing where there is no such factor up to 16: the principal point is outside of the image,
+// or the distortion is not invertible in it.
 std::optional<Lens> without_distortion(const Lens& lens);
 
 }  // namespace maq

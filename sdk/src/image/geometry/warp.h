@@ -1,8 +1,7 @@
 // Images rotated, moved or scaled by an affine map, bilinear.
 //
-// Not by OpenCV's warpAffine, which before its version 5 rounds positions to 1/32 of a pixel: an error that is seen
-// where an image has edges, and another one than in what the networks learnt from. Beyond the border the last pixels
-// are repeated.
+// Not by OpenCV's warpAffine, which before its version 5 rounds positions to 1/32 of a pixel: a visible error at edges,
+// and another error than in the training data. Beyond the border the last pixels are repeated.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// From posed photos and a point cloud to a scene: loading, fitting, packing, and what all that took.
+// Builds a scene from posed photos and a point cloud: loading, fitting, packing, and their times.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,8 @@ struct SceneBuildOptions {
   FittingOptions fitting;
   ScenePacking packing;
   uint64_t max_points = 0;  // of larger clouds points are taken evenly; 0: all
-  // Larger photos are shrunk; 0: none, and those over the networks' limit (SceneNetworks::kMaxPixels) are left out.
+  // Larger photos are shrunk. 0: no photo is shrunk, and photos over the networks' limit (SceneNetworks::kMaxPixels)
+  // are left out.
   int long_side_px = 640;
   // For captures:
   size_t max_views = 0;        // evenly from all that may be used; 0: all
@@ -39,8 +40,8 @@ class SceneBuilder {
   SceneBuilder(PointCloud cloud, const std::array<double, 3>& up, std::shared_ptr<SceneNetworks> networks,
                const SceneBuildOptions& options);
 
-  // Both return how many points the photo sees, and nothing where they were cancelled; they throw what
-  // PosedView::load() and DescriptorFitter::add_view() throw, and then change nothing.
+  // Both return the number of points that the photo sees, or nothing if they were cancelled. They throw the errors of
+  // PosedView::load() and DescriptorFitter::add_view(), and then change nothing.
   std::optional<size_t> add_view(const CaptureView& view, const BuildProgress& progress = {});
   std::optional<size_t> add_view(const ImageView& image, const Lens& lens, const PinholeCamera& pose,
                                  const BuildProgress& progress = {});
@@ -59,7 +60,7 @@ class SceneBuilder {
 
   std::shared_ptr<SceneNetworks> networks_;
   SceneBuildOptions options_;
-  SceneBuildStats stats_;  // without what the fitter counts
+  SceneBuildStats stats_;  // without the fitter's counts
   DescriptorFitter fitter_;
   PosedView photo_;
 };

@@ -27,12 +27,12 @@ struct FittingOptions {
   // points behind it.
   double visibility_scale = 1;
   double near = 0;  // depth of the nearest point that is seen, in units of the scene
-  int threads = 2;  // for what is done point by point; the networks have their own
+  int threads = 2;  // for work on single points; the networks have their own
   // For all regressions: 340 bytes for each point that was seen, and 4 for each of the cloud.
   uint64_t max_bytes = uint64_t(2) << 30;
 };
 
-// Gets how much is done, 0..1, and what is being done, as a sentence. False cancels.
+// Gets the finished fraction, 0..1, and a sentence about the current step. False cancels.
 using BuildProgress = std::function<bool(double done, const std::string& what)>;
 
 struct FittingTimes {
@@ -49,10 +49,10 @@ class DescriptorFitter {
                    const FittingOptions& options);
 
   // A photo, BGR, and its camera. `valid`: the validity mask, 0 for pixels that are not of the photo, row by row; null
-  // when all are. Returns how many points it saw, 0 included; nothing where it was cancelled. Whatever it throws, the
-  // fitter stays as it was before: MAQ_ERROR_INVALID_ARGUMENT for an invalid camera or one of another size,
-  // MAQ_ERROR_IMAGE_SIZE for a photo over the limit of the networks, MAQ_ERROR_OUT_OF_MEMORY where max_bytes is too
-  // little, and what SceneNetworks::extract() throws.
+  // when all are. Returns how many points it saw, 0 included; nothing where it was cancelled. If it throws, the fitter
+  // stays as it was: MAQ_ERROR_INVALID_ARGUMENT for an invalid camera or one of another size, MAQ_ERROR_IMAGE_SIZE for
+  // a photo over the limit of the networks, MAQ_ERROR_OUT_OF_MEMORY if max_bytes is too little, and the errors of
+  // SceneNetworks::extract().
   std::optional<size_t> add_view(const ImageView& photo, const uint8_t* valid, const PinholeCamera& camera,
                                  const BuildProgress& progress = {});
 

@@ -3,12 +3,12 @@
 //
 // A view gives a feature y (8 values, from the image) and a basis value h (6 values, from the direction). The
 // descriptor for a new direction is y(h) = beta0 + h beta, with beta0 = mean y and beta the solution of
-//   (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0.
-// The right side is that of centred values. What is kept is the triangle R of a QR decomposition of the centred basis
-// values and d = Q^T y of the features: R^T R is their scatter, R^T d the right side. It is updated row by row by
-// Givens rotations (Golub, Van Loan, "Matrix Computations", sections 5.1.8 and 6.5.3). Sums of products would square
-// the condition of the system, and differences of large sums would leave nothing where all directions are nearly equal;
-// here both are as exact as the values themselves, in float, and where all directions are equal R and d stay exactly 0.
+// (sum h^T h + alpha I) beta = sum h^T y - (sum h)^T beta0. The right side is that of centred values. The stored state
+// is the triangle R of a QR decomposition of the centred basis values and d = Q^T y of the features: R^T R is their
+// scatter, R^T d the right side. It is updated row by row by Givens rotations (Golub, Van Loan, "Matrix Computations",
+// sections 5.1.8 and 6.5.3). Sums of products would square the condition of the system, and differences of large sums
+// would leave nothing where all directions are nearly equal; here both are as exact as the values themselves, in float,
+// and where all directions are equal R and d stay exactly 0.
 #pragma once
 
 #include <cstdint>

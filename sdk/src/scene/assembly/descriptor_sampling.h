@@ -11,7 +11,7 @@
 
 namespace maq {
 
-// Leaves those of `points` (indices) whose pixel of the photo is valid: not 0 in `valid`, row by row.
+// Keeps the points of `points` (indices) with a valid pixel of the photo: not 0 in `valid`, row by row.
 void keep_valid(const PointPositions& positions, const PinholeCamera& camera, const uint8_t* valid,
                 std::vector<uint32_t>& points);
 

@@ -36,10 +36,10 @@ struct Capture {
 // there is one; or transforms.json (or transforms_train.json) with the PLY cloud that it names, or sparse_pc.ply,
 // points3d.ply, points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there is taken.
 //
-// A photo of another size than its camera stands for it when both have the same shape to within 1 %. Photos are read as
-// they are stored, not rotated by EXIF, as by the programs that find the cameras. What cannot be used of the rest is
-// dropped and counted. Up is the cameras' for COLMAP (scene_up.h); +z for transforms.json, unless the cameras say
-// otherwise by over 45 degrees.
+// A photo of another size than its camera is used if both have the same aspect ratio within 1 %. Photos are read as
+// they are stored, not rotated by EXIF, as by the programs that find the cameras. Unusable parts are dropped and
+// counted. Up is the cameras' for COLMAP (scene_up.h); +z for transforms.json, unless the cameras say otherwise by over
+// 45 degrees.
 //
 // Throws MAQ_ERROR_NOT_FOUND when there is no such folder, no capture in it or neither a cloud nor a depth image,
 // MAQ_ERROR_UNREADABLE for damaged files and when no photo or no point is left, MAQ_ERROR_UNSUPPORTED for camera
@@ -47,12 +47,12 @@ struct Capture {
 Capture open_capture(const std::string& folder);
 
 // Reads a view's photo and undistorts it: `picture` is BGR of the size of view.camera; `valid` has 255 for pixels that
-// the photo has, 0 for others. Throws what read_image_file() throws, MAQ_ERROR_UNREADABLE also when the photo's size
+// the photo has, 0 for others. Throws the errors of read_image_file(), MAQ_ERROR_UNREADABLE also if the photo's size
 // changed since the capture was opened.
 void load_view(const CaptureView& view, Frame& picture, std::vector<uint8_t>& valid);
 
-// Reads a view's depth image: DEPTH16 or DEPTH32F of any size, and `camera`, its camera. Throws what read_depth_file()
-// throws, MAQ_ERROR_NOT_FOUND for a view without depth, MAQ_ERROR_UNSUPPORTED where the view's lens is distorted.
+// Reads a view's depth image: DEPTH16 or DEPTH32F of any size, and `camera`, its camera. Throws the errors of
+// read_depth_file(), MAQ_ERROR_NOT_FOUND for a view without depth, MAQ_ERROR_UNSUPPORTED for a lens with distortion.
 void load_depth(const CaptureView& view, Frame& depth, PinholeCamera& camera);
 
 }  // namespace maq

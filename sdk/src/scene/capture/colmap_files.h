@@ -38,7 +38,7 @@ class ColmapFiles {
   static std::optional<ColmapFiles> find(const std::string& folder);
 
   // All throw MAQ_ERROR_UNREADABLE for files that are damaged or claim more than they hold, cameras()
-  // MAQ_ERROR_UNSUPPORTED for camera models other than those above, images() for more than kMaxImages.
+  // MAQ_ERROR_UNSUPPORTED for other camera models, images() for more than kMaxImages.
   std::vector<ColmapCamera> cameras() const;
   std::vector<ColmapImage> images() const;
   // `take` gets one after the other; `announce` before how many there are, 0 when the file does not say.

@@ -11,7 +11,7 @@ namespace maq {
 struct Dropped {
   std::string reason;
   size_t count = 0;
-  std::string first;  // name of the first one; "" for things without names
+  std::string first;  // name of the first one; "" if it has no name
 
   std::string reason_and_first() const { return first.empty() ? reason : reason + " (first: " + first + ")"; }
 };

@@ -1,4 +1,4 @@
-// The head of a PLY file: what its elements are made of.
+// The head of a PLY file: its elements and their properties.
 #pragma once
 
 #include <cstdint>

@@ -25,7 +25,7 @@ inline constexpr char kDepthOutside[] = "depth images whose name leads out of th
 inline constexpr char kDepthMissing[] = "depth images that are not in their folder";
 inline constexpr char kPhotosUnreadable[] = "photos that cannot be read as images";
 
-// And those in their numbers; null when there is none.
+// Also returns the fault of the photo's numbers; null if there is none.
 const char* fault_of(const Lens& lens);
 const char* fault_of_pose(const PosedPhoto& photo);
 

@@ -1,4 +1,4 @@
-// The points of one block to and from what is stored: floats, or integers times a step that the block chooses.
+// Converts the points of one block to stored numbers and back: floats, or integers times a step that the block chooses.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +16,12 @@ struct SceneArrays {
 };
 
 // Fills the block's bounds and steps and its parts of the arrays with the points `indices`, of which the first
-// block.view_dependent have linear terms. `block` has its counts. Bounds hold what is stored, however a decoder rounds.
+// block.view_dependent have linear terms. `block` has its counts. Bounds contain the stored positions, however a
+// decoder rounds.
 void encode_block(const FittedPoints& points, const uint32_t* indices, SceneBlock& block, const SceneArrays& arrays);
 
-// The points of one block as floats, in its order; linear terms are 0 where there are none. What a scene does not keep
-// is left empty: view_dependence and views. The renderer decodes what it needs itself (descriptor_decoding.h).
+// The points of one block as floats, in its order; linear terms are 0 where there are none. Arrays that a scene does
+// not keep stay empty: view_dependence and views. The renderer has its own decoder (descriptor_decoding.h).
 FittedPoints decode_block(const Scene& scene, const SceneBlock& block);
 
 }  // namespace maq

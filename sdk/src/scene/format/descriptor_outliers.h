@@ -1,4 +1,4 @@
-// Points whose descriptors are out of all proportion to those of the others.
+// Finds points with descriptors far outside of the range of other points.
 #pragma once
 
 #include <cstdint>

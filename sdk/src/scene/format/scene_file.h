@@ -16,8 +16,8 @@ void write_scene_file(const Scene& scene, const std::string& path);
 //
 // Everything is read once and compared with its checksums. Whatever the bytes, also those of a hostile file with right
 // checksums, what then comes of a scene is within its arrays, finite and at most 2e30; a mapped file that is written to
-// later can only change numbers. Throws MAQ_ERROR_NOT_FOUND; MAQ_ERROR_UNREADABLE for what is not a scene, truncated or
-// damaged; MAQ_ERROR_UNSUPPORTED for other versions and more than kMaxPoints; MAQ_ERROR_OUT_OF_MEMORY.
+// later can only change numbers. Throws MAQ_ERROR_NOT_FOUND; MAQ_ERROR_UNREADABLE for a file that is not a scene,
+// truncated or damaged; MAQ_ERROR_UNSUPPORTED for other versions and more than kMaxPoints; MAQ_ERROR_OUT_OF_MEMORY.
 Scene open_scene_file(const std::string& path);
 
 // The same of a file's bytes in memory, at any alignment, with the same checks. All is copied: the bytes may be freed

@@ -32,7 +32,7 @@ struct SceneFileHead {
   char magic[8];
   uint32_t version;
   uint32_t head_bytes;  // of this struct
-  uint64_t head_check;  // 64-bit XXH3 of what follows in this struct
+  uint64_t head_check;  // 64-bit XXH3 of the rest of this struct
   uint64_t file_bytes;
   double origin[3], up[3];
   uint32_t points, view_dependent, blocks;

@@ -40,8 +40,8 @@ struct PointOrder {
 // The first half of make_scene(), which throws the same.
 PointOrder order_points(const FittedPoints& points, const ScenePacking& packing);
 
-// The scene owns its arrays. With kFloat32 positions and coefficients are exactly those given.
-// Throws MAQ_ERROR_INVALID_ARGUMENT without points, where lists differ in length, for a fraction outside 0..1, and for
+// The scene owns its arrays. With kFloat32, positions and coefficients are exactly the given ones. Throws
+// MAQ_ERROR_INVALID_ARGUMENT without points, where lists differ in length, for a fraction outside 0..1, and for
 // positions and coefficients that are not finite or over kMaxMagnitude; MAQ_ERROR_UNSUPPORTED for more than kMaxPoints.
 Scene make_scene(const FittedPoints& points, const ScenePacking& packing);
 

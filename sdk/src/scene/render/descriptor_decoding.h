@@ -16,7 +16,7 @@ struct PointToShade {
 // Points that are shaded together.
 inline constexpr size_t kShadedAtOnce = 64;
 
-// Prefetches what the descriptors of the points need, which may lie anywhere in memory.
+// Prefetches the data of the points' descriptors, which may lie anywhere in memory.
 void prefetch(const Scene& scene, const PointToShade* points, size_t count, bool with_linear_terms);
 
 // Unit vectors from a camera's centre to at most kShadedAtOnce points, one array for each coordinate; 0 for a point in

@@ -20,7 +20,7 @@
 
 namespace maq {
 
-// A part of a picture; all numbers are multiples of DescriptorRaster::kMultiple.
+// A part of an image; all numbers are multiples of DescriptorRaster::kMultiple.
 struct RasterWindow {
   int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
 };
@@ -46,9 +46,9 @@ class DescriptorRaster {
 
   static constexpr size_t kColours = 3;  // features that are red, green and blue
 
-  // The refiner's input of that number, in its layout, with features and the 1 of a pixel side by side. Where there is
-  // no point the colours are those of the next coarser level, in the coarsest the scene's background, all else is 0.
-  // All kLevels, also where the refiner reads fewer: colours come from the coarsest.
+  // The refiner's input of that number, in its layout, with features and the 1 of a pixel side by side. Pixels without
+  // a point have the colour of the next coarser level, or in the coarsest level the scene's background; their other
+  // channels are 0. All kLevels, also where the refiner reads fewer: colours come from the coarsest.
   const float* level(int level) const { return levels_[level].data(); }
   // Keys of the visible points, row by row, at each of the kLevels scales.
   const DepthKey* keys(int level) const { return keys_[level].data(); }

@@ -10,8 +10,8 @@
 
 namespace maq {
 
-// Where the picture of a window goes: rows of `columns` pixels, of which those from (left, top) on are the window's.
-// What of the window is not inside is left out.
+// The target of a window's image: rows of `columns` pixels, of which those from (left, top) on are the window's. Parts
+// of the window outside of it are left out.
 struct ImageRows {
   uint8_t* bgr = nullptr;
   uint8_t* alpha = nullptr;
@@ -21,8 +21,8 @@ struct ImageRows {
 
 class RefinedImage {
  public:
-  // `refined` is what SceneNetworks::refine() gave for the window (RGB, 0..1, clamped here; NaN becomes 0).
-  // `alphas` and `depths`, of the window too, are copied. The picture is blended over `background` (BGR) by `alphas`
+  // `refined` is the result of SceneNetworks::refine() for the window (RGB, 0..1, clamped here; NaN becomes 0).
+  // `alphas` and `depths`, of the window too, are copied. The image is blended over `background` (BGR) by `alphas`
   // times `confidence_gain`, clamped.
   void write(const float* refined, const RefinerLayout& layout, const RasterWindow& window, const uint8_t* alphas,
              const float* depths, const std::array<uint8_t, 3>& background, int confidence_gain, const ImageRows& to,

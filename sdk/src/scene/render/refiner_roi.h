@@ -1,4 +1,4 @@
-// The refiner's region of interest: which part of a picture it must work on.
+// The refiner's region of interest: the part of an image that it must compute.
 #pragma once
 
 #include "scene/render/descriptor_raster.h"

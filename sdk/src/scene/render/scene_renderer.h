@@ -43,15 +43,15 @@ struct RenderCounts {
 
 class SceneRenderer {
  public:
-  // The networks must be those that the scene was made with, in any precision. Throws MAQ_ERROR_INVALID_ARGUMENT for
+  // The scene must have been built with the same networks, in any precision. Throws MAQ_ERROR_INVALID_ARGUMENT for
   // options out of range.
   SceneRenderer(Scene scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options);
 
-  // Renders gravity-aligned in the smallest frame that holds the camera's image, and rotates the result back. The
-  // same image with any number of threads. Alpha is as of Coverage; depth is in units of the scene. Not for two threads
-  // at once, nor while another uses the networks' refiner. Throws what check_camera() and SceneNetworks::refine()
-  // throw, and MAQ_ERROR_INVALID_ARGUMENT for a camera whose principal point is over 10^6 pixels away or whose focal
-  // lengths differ by a factor over 1000.
+  // Renders gravity-aligned in the smallest frame that holds the camera's image, and rotates the result back. The same
+  // image with any number of threads. Alpha is as of Coverage; depth is in units of the scene. Not for two threads at
+  // once, nor while another uses the networks' refiner. Throws the errors of check_camera() and
+  // SceneNetworks::refine(), and MAQ_ERROR_INVALID_ARGUMENT for a camera with a principal point over 10^6 pixels away
+  // or focal lengths that differ by a factor over 1000.
   RenderCounts render(const PinholeCamera& camera, RenderedImage& image);
 
  private:
@@ -65,7 +65,7 @@ class SceneRenderer {
   void project(const PinholeCamera& frame, RenderCounts& counts);
   // Merges the workers' depth buffers and finds the part that has points; of size 0 when there are none.
   RasterWindow finish(const PinholeCamera& frame);
-  // Shades and refines what is in the depth buffer.
+  // Shades and refines the points in the depth buffer.
   void refine(const PinholeCamera& frame, const RasterWindow& occupied, const std::array<uint8_t, 3>& background,
               RenderedImage& image, RenderCounts& counts);
   void rotate_back(RenderedImage& from, const PixelMap& to_frame, RenderedImage& image);

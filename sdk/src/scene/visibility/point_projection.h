@@ -1,4 +1,4 @@
-// Where points are in a camera's picture: one pixel a point (NPBG++, arXiv 2203.13318, section 3.4).
+// Projects points to a camera's image: one pixel a point (NPBG++, arXiv 2203.13318, section 3.4).
 #pragma once
 
 #include <cstdint>
@@ -38,8 +38,8 @@ class PointProjection {
   // Points nearer than `near` (in units of the scene, along the optical axis) are outside.
   PointProjection(const PinholeCamera& camera, double near);
 
-  // For each point its pixel, row * width + column, or width * height where it is outside of the picture or not finite;
-  // and its depth along the optical axis, which is undefined outside of the picture.
+  // For each point its pixel, row * width + column, or width * height if it is outside of the image or not finite; and
+  // its depth along the optical axis, which is undefined outside of the image.
   void project(const PointSpan& span, int32_t* pixels, float* depths) const;
 
  private:

@@ -1,4 +1,4 @@
-// The view frustum of a camera, to cull blocks of points that cannot be in its picture.
+// The view frustum of a camera, to cull blocks of points that cannot be in its image.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ class ViewFrustum {
   // Points d from the camera's centre are in front of a plane where along . d >= min_distance.
   struct Plane {
     double along[3];
-    double rounding[3];  // what a coordinate of 1 may add by rounding
+    double rounding[3];  // rounding error of a coordinate of 1
     double min_distance;
   };
   std::array<double, 3> centre_;

@@ -1,8 +1,8 @@
 // Which point is visible at each pixel: the front-most, and of equally deep ones that with the lowest index.
 //
 // A pixel is a key: the depth's bits (ordered as positive floats are), then the index; the smallest is kept, in
-// whatever order points are drawn. So each thread draws into a depth buffer of its own, and the minimum of all is the
-// same picture.
+// whatever order points are drawn. Each thread therefore draws into its own depth buffer, and the minimum of all gives
+// the same image.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ inline float depth_of(DepthKey key) {
 
 class ZBuffer {
  public:
-  // An empty picture, drawn by so many workers. Throws MAQ_ERROR_IMAGE_SIZE, std::bad_alloc.
+  // Begins an empty image, drawn by `workers` workers. Throws MAQ_ERROR_IMAGE_SIZE, std::bad_alloc.
   void begin(const PinholeCamera& camera, double near, int workers);
 
   // Draws points. Different workers may draw at once.
@@ -55,8 +55,8 @@ class ZBuffer {
 
  private:
   struct DepthBuffer {
-    std::vector<DepthKey> keys;  // one more than pixels: for points outside of the picture
-    bool is_drawn = false;       // else its keys are of an earlier picture
+    std::vector<DepthKey> keys;  // one more than pixels: for points outside of the image
+    bool is_drawn = false;       // else its keys are of an earlier image
   };
   void clear(DepthBuffer& buffer);
 

@@ -21,7 +21,7 @@ namespace maq {
 std::shared_ptr<Camera> open_android_camera(const ndk::Functions& functions, const std::string& name,
                                             const CameraRequest& request, int display_deg, int buffers);
 
-// Each camera with its sizes. One that does not say what it can do is listed with the reason.
+// Each camera with its sizes. A camera that does not report its modes is listed with the reason.
 std::vector<CameraListing> list_android_cameras(const ndk::Functions& functions);
 
 // For "android:0" or "android:back", with size, fps and display as requests. Throws for unknown options. Opened again,

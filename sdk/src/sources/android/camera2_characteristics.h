@@ -51,10 +51,10 @@ class Camera2Characteristics {
   const std::vector<Camera2Size>& sizes() const { return sizes_; }
   // Throws MAQ_ERROR_UNSUPPORTED when there are none.
   Camera2Size nearest_size(int width_px, int height_px) const;
-  // With the nearest maximum, and of those the highest minimum: the rate that was asked for, whatever the light.
+  // The range with the nearest maximum, and among these the highest minimum: the requested rate, whatever the light.
   // Nothing when the device lists none.
   std::optional<Camera2Rates> nearest_rates(double fps) const;
-  // For images of that size before they are rotated, which show the middle of what the sensor sees.
+  // For images of that size before they are rotated, which show the middle of the sensor's image.
   std::optional<maq_intrinsics> intrinsics(int width_px, int height_px) const;
 
  private:

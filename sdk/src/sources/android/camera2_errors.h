@@ -8,10 +8,10 @@
 
 namespace maq {
 
-// MAQ_ERROR_UNSUPPORTED for those without a meaning of their own.
+// MAQ_ERROR_UNSUPPORTED for statuses without their own meaning.
 maq_status camera2_maq_status(ndk::camera_status_t status);
 
-// Throws camera2_maq_status(status): "`name` `what`: the meaning of the status.", and what to do.
+// Throws camera2_maq_status(status): "`name` `what`: the meaning of the status.", and the remedy.
 [[noreturn]] void fail_camera2(const std::string& name, const std::string& what, ndk::camera_status_t status);
 
 // Maps a status of the image functions.

@@ -1,6 +1,6 @@
 // The functions of Android's NDK that a camera needs, as a table, so that a test can take Android's place. Names, types
-// and values are those of the NDK's headers <camera/Ndk*.h> and <media/NdkImage*.h>; builds do without these. Where
-// they are, camera2_functions.cpp compares each declaration with them.
+// and values equal the NDK's headers <camera/Ndk*.h> and <media/NdkImage*.h>; builds do without these. Where they are,
+// camera2_functions.cpp compares each declaration with them.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Events of a camera, from Android's threads to that of a source.
+// Passes events of a camera from Android's threads to the thread of a source.
 #pragma once
 
 #include <atomic>
@@ -10,8 +10,8 @@
 
 namespace maq {
 
-// The callbacks only post here: one that called a function of the camera or its images would wait for a lock that those
-// hold who close them, and wait for the callback. Older versions of Android may call back for a moment after
+// The callbacks only post here. A callback that called a function of the camera or its images could deadlock: closing
+// them holds their lock and waits for the callback. Older versions of Android may call back for a moment after
 // ACameraDevice_close, so the callbacks' context is a number, and events for a mailbox that is gone are dropped.
 class Camera2Mailbox {
  public:

@@ -37,7 +37,8 @@ maq_status status_of(const std::string& text, maq_status fallback) {
 
 const char* remedy_for(maq_status status) {
   switch (status) {
-    case MAQ_ERROR_NO_PERMISSION: return " The user needs a udev rule for the device: see docs/cameras/depthai.md.";
+    case MAQ_ERROR_NO_PERMISSION:
+      return " The user needs a udev rule for the device: see docs/reference/cameras/depthai.md.";
     case MAQ_ERROR_NOT_FOUND: return " Is the device plugged in, powered, and free?";
     case MAQ_ERROR_DEVICE_LOST: return " The link to the device broke: check cable and power.";
     default: return camera_remedy(status);

@@ -1,4 +1,4 @@
-// The controls of a DepthAI camera: what they can be, and what they are.
+// The controls of a DepthAI camera: their ranges and current values.
 #pragma once
 
 #include "maquette/source.h"
@@ -11,12 +11,12 @@ class DepthAiControls {
   DepthAiControls() = default;
   DepthAiControls(const DepthAiFeatures& features, double fps);
 
-  // While the device chooses, what it chose for the newest image is the value.
+  // In automatic mode, the value is the device's choice for the newest image.
   void note(const DepthAiFrame& newest);
 
-  // Throws MAQ_ERROR_UNSUPPORTED for what the device does not have.
+  // Throws MAQ_ERROR_UNSUPPORTED for a control that the device does not have.
   maq_source_control_info info(maq_source_control which) const;
-  // Throws MAQ_ERROR_INVALID_ARGUMENT out of range, and what the session throws; then nothing has changed here.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for a value out of range, and the errors of the session; then nothing changes.
   void set(maq_source_control which, double value, DepthAiSession& session);
 
  private:

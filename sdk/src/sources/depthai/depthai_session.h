@@ -48,7 +48,7 @@ struct DepthAiLens {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   // In OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, taux, tauy.
   std::vector<double> distortion;
-  bool is_perspective = true;  // false: the coefficients are those of another model (fisheye)
+  bool is_perspective = true;  // false: the coefficients are of another model (fisheye)
 };
 
 // An image or a depth image as it came, without a copy.

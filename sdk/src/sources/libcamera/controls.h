@@ -1,5 +1,5 @@
-// The controls of a camera of libcamera. Each request takes one setting to the camera, so what was set goes out with
-// the next ones, in order.
+// The controls of a camera of libcamera. Each request takes one setting to the camera, so settings go out with the next
+// requests, in order.
 #pragma once
 
 #include <libcamera/controls.h>
@@ -48,8 +48,8 @@ class LibcameraControls {
   std::deque<Setting> settings_;
 };
 
-// As near to `fps` as the camera can: put into what it is started with. Returns the rate, or 0 for a camera that keeps
-// its rate to itself.
+// As near to `fps` as the camera can: put into its start settings. Returns the rate, or 0 for a camera that keeps its
+// rate to itself.
 double set_libcamera_rate(const libcamera::ControlInfoMap& offered, double fps, libcamera::ControlList& at_start);
 
 }  // namespace maq

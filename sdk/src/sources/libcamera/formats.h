@@ -1,4 +1,4 @@
-// Which of libcamera's formats this build understands, and the choice among those of a camera.
+// Which of libcamera's formats this build understands, and the choice among a camera's formats.
 #pragma once
 
 #include <libcamera/camera.h>

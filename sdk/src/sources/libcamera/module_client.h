@@ -16,8 +16,8 @@ namespace maq {
 class LibcameraCameras {
  public:
   virtual ~LibcameraCameras() = default;
-  // Opens the camera `name`, an id of libcamera or a number in its list, and starts it. Throws what
-  // libcamera_uri_opener throws.
+  // Opens the camera `name`, an id of libcamera or a number in its list, and starts it. Throws the errors of
+  // libcamera_uri_opener.
   virtual std::shared_ptr<Camera> open(const std::string& name, const CameraRequest& request, int buffers) const = 0;
   virtual std::vector<CameraListing> list() const = 0;
 };

@@ -1,4 +1,4 @@
-// Events of a camera, from libcamera's thread to that of a source.
+// Passes events of a camera from libcamera's thread to the thread of a source.
 #pragma once
 
 #include <libcamera/base/object.h>

@@ -1,6 +1,7 @@
-// Recordings (.maqrec): frames as a camera gave them, with their times, depth and intrinsics. docs/formats.md has the
-// layout. Each frame carries its own checksum and lies whole in the file once add() has returned, so that after a crash
-// every frame but the one being written can be read; an index at the end, when there is one, saves looking for them.
+// Recordings (.maqrec): frames as a camera gave them, with their times, depth and intrinsics. docs/reference/formats.md
+// has the layout. Each frame carries its own checksum and lies whole in the file once add() has returned, so that after
+// a crash every frame but the one being written can be read; an index at the end, when there is one, saves looking for
+// them.
 #pragma once
 
 #include <cstdint>

@@ -26,7 +26,7 @@ struct RecordingHead {
 };
 static_assert(sizeof(RecordingHead) == 24);
 
-// Before the pixels of each frame: rows without padding, planes one after the other, then those of the depth image.
+// Before the pixels of each frame: rows without padding, planes one after the other, then the rows of the depth image.
 struct FrameHead {
   uint32_t magic;
   uint32_t head_check;  // checksum of the rest of this struct

@@ -12,8 +12,8 @@ namespace maq {
 class DepthNoise {
  public:
   // "none", "stereo" (errors of disparity, steps, fattened foreground, half-occlusion) or "tof" (errors that grow with
-  // the range, mixed pixels at jumps). docs/cameras/simulated.md has the numbers. Throws MAQ_ERROR_INVALID_ARGUMENT for
-  // another name.
+  // the range, mixed pixels at jumps). docs/reference/cameras/simulated.md has the numbers. Throws
+  // MAQ_ERROR_INVALID_ARGUMENT for another name.
   DepthNoise(const std::string& name, uint64_t seed);
 
   // Applies the noise to exact depth.

@@ -1,4 +1,4 @@
-// Random numbers that are the same on every platform, unlike those of the distributions of <random>.
+// Random numbers that are the same on every platform, unlike the distributions of <random>.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Rays of a camera against the solids of a scene, in float64: what is seen first.
+// Rays of a camera against the solids of a scene, in float64: the nearest hit.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,8 @@ class SolidsRays {
   // From another place; memory is kept.
   void look(const SolidsScene& scene, const SolidsView& view);
 
-  // Depth along the optical axis of what the ray in direction (x, y, 1) of the camera meets first; infinite for
-  // nothing.
+  // Depth along the optical axis of the first hit of the ray in direction (x, y, 1) of the camera; infinite without a
+  // hit.
   double depth(double x, double y) const;
 
   // Writes the depth of each pixel in metres, 0 where there is nothing.

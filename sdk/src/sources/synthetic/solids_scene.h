@@ -18,7 +18,7 @@ struct Solid {
   Vector3 centre{}, half{};  // half of its sizes
   double cosine = 1, sine = 0;
   double radius = 0;       // of a cylinder; 0: a box
-  bool is_carton = false;  // a thing to measure; false: a floor, a wall, furniture, a part
+  bool is_carton = false;  // an object to measure; false: a floor, a wall, furniture, a part
 };
 
 // Solids touch one another, but none is partly inside another one, but for the parts of a box with a rounded edge: two
@@ -34,8 +34,8 @@ struct SolidsScene {
 };
 
 // `name`: "wall" (one plane), "box" (a carton on a floor), "shelf" (cartons and a rounded box on boards) or "room" (a
-// corner with a table, cartons, a bin and a rounded box). Sizes and places follow from `seed`.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for another name.
+// corner with a table, cartons, a bin and a rounded box). Sizes and positions follow from `seed`. Throws
+// MAQ_ERROR_INVALID_ARGUMENT for another name.
 SolidsScene make_solids_scene(const std::string& name, uint64_t seed);
 
 // The axes of the camera as rows, and its place, in the world: a point p appears at axes * (p - centre).

@@ -11,7 +11,7 @@ namespace maq {
 struct SolidsEdge {
   Vector3 from{}, to{};
   Vector3 normals[2]{};     // normals of the two sides, outwards
-  bool is_concave = false;  // as between a thing and what it stands on
+  bool is_concave = false;  // as between an object and its support
 };
 std::vector<SolidsEdge> solids_edges(const SolidsScene& scene);
 

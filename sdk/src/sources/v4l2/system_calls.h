@@ -20,7 +20,7 @@ class SystemCalls {
   virtual int munmap(void* address, size_t length);
   virtual int poll(pollfd* fds, nfds_t count, int timeout_ms);
 
-  // Whether the path is there, but not as a device of Video4Linux. Opening such a thing could change it: it may be a
+  // Whether the path is there, but not as a device of Video4Linux. Opening such a file could change it: it may be a
   // terminal, a disk or a tape.
   virtual bool is_other_thing(const char* path);
 

@@ -1,4 +1,4 @@
-// A device of Video4Linux2 that is open: its calls, what it is, and what it offers.
+// An open Video4Linux2 device: its calls, its kind and its modes.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ const V4l2Format* known_v4l2_format(uint32_t fourcc);
 
 class V4l2Device {
  public:
-  // Opens the device and checks that it is a camera that can stream. Throws what open_v4l2_camera throws.
+  // Opens the device and checks that it is a camera that can stream. Throws the errors of open_v4l2_camera.
   V4l2Device(SystemCalls& calls, std::string path);
   ~V4l2Device();
   V4l2Device(const V4l2Device&) = delete;
@@ -39,7 +39,7 @@ class V4l2Device {
 
   // An ioctl, begun again when a signal interrupts it: -1 and errno when it fails. From any thread.
   int call(unsigned long request, void* argument) const;
-  // Throws what the error number means; `what` goes on after the path: "gives no buffers".
+  // Throws the error for the error number; `what` goes on after the path: "gives no buffers".
   [[noreturn]] void fail(const std::string& what, int error) const;
 
   // The fourcc of each format that it offers. Throws MAQ_ERROR_DEVICE_LOST.

@@ -11,7 +11,6 @@ from torch import Tensor, nn
 
 from export.densepose.graphs import session
 from export.scenes.bundle import BASIS
-from export.scenes.config import RASTER
 from export.scenes.networks.basis import Basis
 from export.scenes.networks.light_refiner import depth_to_space, space_to_depth
 from quantization.samples import Sample
@@ -42,10 +41,7 @@ class _Extractor(_Graph):
 
 class _Refiner(_Graph):
     def forward(self, rasters: list[Tensor]) -> Tensor:
-        inputs = self.session.get_inputs()
-        used = rasters[: len(inputs)]
-        if inputs[0].shape[-1] == RASTER:
-            return self.run(used)
+        used = rasters[: len(self.session.get_inputs())]
         return depth_to_space(self.run([space_to_depth(used[0]), *used[1:]]))
 
 

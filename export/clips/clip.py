@@ -14,7 +14,7 @@ SPLITS = ("train", "val", "test")
 FRAMES = 30
 SIDE_PX = 64  # of the frames that networks see: an image of any shape is squeezed to this square
 LARGE_PX = (320, 240)  # width and height of the frames that val and test clips have as well
-_SETS = ("shapes", "pushing", "people", "flights", "collages")
+_SETS = ("shapes", "pushing", "collages")
 
 
 class ClipError(ValueError):

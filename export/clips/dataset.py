@@ -26,8 +26,6 @@ MAKERS = {
     "shapes": "export.clips.shapes:shapes_clip",
     "pushing": "export.clips.pushing:pushing_clip",
     "collages": "export.clips.collages:collages_clip",
-    "people": "export.clips.people:people_clip",
-    "flights": "export.clips.flights:flights_clip",
 }
 _MAX_S = 600
 

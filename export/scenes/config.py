@@ -29,36 +29,18 @@ class ExtractorConfig:
 
 @dataclass(frozen=True)
 class RefinerConfig:
-    """kind: `gated`, as in the paper (the rest is not used then), or `light`.
+    """widths: channels at 1/2, 1/4, ... of the image; rasters coarser than the last are not read."""
 
-    block: of the light one, `conv` (3x3) or `separable` (depthwise 3x3, then 1x1). join: how a skip meets what comes
-    from below, `add` or `concat`. space_to_depth: whether it begins and ends at half
-    resolution, 2x2 pixels as channels.
-    widths: channels at 1/2, 1/4, ... of the image with space_to_depth, else at 1, 1/2, ...; rasters coarser than the
-    last are not read.
-    """
-
-    kind: str = "light"
-    block: str = "conv"
-    join: str = "concat"
-    space_to_depth: bool = True
     widths: tuple[int, ...] = (24, 32, 48, 64)
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("kind", ("gated", "light")),
-            ("block", ("conv", "separable")),
-            ("join", ("add", "concat")),
-        ):
-            if getattr(self, name) not in known:
-                raise ValueError(f"A refiner's {name} is {' or '.join(known)}, not {getattr(self, name)!r}.")
         if not self.widths or min(self.widths) < 1 or self.levels > LEVELS:
-            raise ValueError(f"A light refiner reads at most {LEVELS} rasters with positive widths, not {self.widths}.")
+            raise ValueError(f"A refiner reads at most {LEVELS} rasters with positive widths, not {self.widths}.")
 
     @property
     def levels(self) -> int:
         """How many rasters it reads, the finest first."""
-        return LEVELS if self.kind == "gated" else len(self.widths) + self.space_to_depth
+        return len(self.widths) + 1
 
 
 @dataclass(frozen=True)
@@ -72,5 +54,4 @@ class SceneConfig:
 SIZES = {
     "tiny": SceneConfig(ExtractorConfig((32, 24, 16, 16, 16)), RefinerConfig(widths=(16, 16, 24, 24))),
     "small": SceneConfig(),
-    "full": SceneConfig(ExtractorConfig((256, 128, 64, 32, 16)), RefinerConfig("gated")),
 }

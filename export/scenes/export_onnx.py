@@ -6,11 +6,10 @@
 
 All tensors have channels last, as int8 kernels want them and as the SDK, which writes and reads a whole pixel at a
 time, does. `extractor`: image [1, H, W, 3], RGB in 0..1, H and W multiples of 32 -> features [1, H, W, 8]. `refiner`:
-raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; a refiner with config.space_to_depth takes
-raster0 as [1, H/2, W/2, 4 * 9] and gives rgb as [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each
-2x2. H and W are open: photos and windows have any size, and a runtime that knows its size fixes the axes named
-`height` and `width` when it loads a graph, which is then as fast as one exported for that size.
-The gated refiner's graph needs sides of at least 32: its borders are reflected.
+raster0, raster1, ... [1, H/2^k, W/2^k, 9] -> rgb [1, H, W, 3], not clamped; raster0 is rearranged to [1, H/2, W/2,
+4 * 9] and rgb to [1, H/2, W/2, 4 * 3], pixels (0, 0), (0, 1), (1, 0), (1, 1) of each 2x2. H and W are open: photos and
+windows have any size, and a runtime that knows its size fixes the axes named `height` and `width` when it loads a
+graph, which is then as fast as one exported for that size.
 Beside them lies `manifest.json` (export.scenes.bundle).
 The basis network has no graph: it is 678 numbers, in `basis.bin`, little-endian float32: for each of its three layers
 the weights [outputs, inputs], then the biases.
@@ -40,7 +39,6 @@ from export.scenes.networks.basis import Basis
 from export.scenes.networks.extractor import STRIDE, Extractor
 from export.scenes.networks.feature_scale import measured, scaled
 from export.scenes.networks.light_refiner import LightRefiner
-from export.scenes.networks.refiner import Refiner
 from export.scenes.networks.system import Networks, load_networks
 
 TOLERANCE = 1e-5  # largest |ONNX - torch|, relative to the output's largest value
@@ -84,28 +82,21 @@ class ExtractorGraph(nn.Module):
 
 
 class RefinerGraph(nn.Module):
-    """Channels last at both ends, rearranged by space_to_depth where the refiner is."""
+    """Channels last at both ends; the first raster and the image are rearranged by space_to_depth."""
 
-    def __init__(self, refiner: Refiner) -> None:
+    def __init__(self, refiner: LightRefiner) -> None:
         super().__init__()
         self.refiner = copy.deepcopy(refiner).eval().requires_grad_(False)
-        self.light = isinstance(refiner, LightRefiner)
-        if self.light:
-            self.refiner.double = doubled
+        self.refiner.double = doubled
 
     def forward(self, *rasters: Tensor) -> Tensor:
-        given = [channels_first(raster) for raster in rasters]
-        return channels_last(self.refiner.of_rearranged(given) if self.light else self.refiner(given))
+        return channels_last(self.refiner.of_rearranged([channels_first(raster) for raster in rasters]))
 
 
-def raster_shapes(refiner: Refiner, height: int, width: int) -> dict[str, list[int]]:
+def raster_shapes(refiner: LightRefiner, height: int, width: int) -> dict[str, list[int]]:
     """Input shapes of a refiner's graph for an image of that size."""
-    is_light = isinstance(refiner, LightRefiner)
-    rearranged, levels = (refiner.config.space_to_depth, refiner.config.levels) if is_light else (False, 5)
-    shapes = {f"raster{k}": [1, height >> k, width >> k, RASTER] for k in range(levels)}
-    if rearranged:
-        shapes["raster0"] = [1, height // 2, width // 2, 4 * RASTER]
-    return shapes
+    shapes = {f"raster{k}": [1, height >> k, width >> k, RASTER] for k in range(refiner.config.levels)}
+    return shapes | {"raster0": [1, height // 2, width // 2, 4 * RASTER]}
 
 
 def export_extractor(extractor: Extractor, path: Path) -> None:
@@ -115,7 +106,7 @@ def export_extractor(extractor: Extractor, path: Path) -> None:
     write_graph(ExtractorGraph(extractor), (given,), path, ["image"], ["features"], axes)
 
 
-def export_refiner(refiner: Refiner, path: Path) -> None:
+def export_refiner(refiner: LightRefiner, path: Path) -> None:
     """Writes the graph of a refiner."""
     height, width = 96, 160
     shapes = raster_shapes(refiner, height, width)

@@ -252,9 +252,7 @@ def parsed() -> TrainingConfig:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=default.data)
     parser.add_argument("--out", type=Path, default=default.out)
-    parser.add_argument(
-        "--size", choices=SIZES, default=default.size, help="of the networks; full is the paper's refiner"
-    )
+    parser.add_argument("--size", choices=SIZES, default=default.size, help="of the networks")
     parser.add_argument(
         "--minutes", type=float, default=default.minutes, help="length of the whole schedule, resumes counted in"
     )

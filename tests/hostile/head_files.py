@@ -4,13 +4,26 @@ from random import Random
 
 import numpy as np
 
-from export.checked_file import CHECKED
-from export.heads.head_file import HEAD
+from export.checked_file import CHECKED, START
+from export.heads.stored_numbers import SHAPE
 from export.xxh3 import xxh3
 from tests.hostile.damage import FLOATS, INTEGERS, cut, flip
 from tests.hostile.samples import Samples
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
+HEAD = np.dtype(
+    [
+        *START,
+        ("shape", SHAPE),
+        *((name, "<u4") for name in ("shape_codes", "colour_codes", "cameras", "anchors", "landmarks")),
+        ("sharpness", "<f4"),
+        *((name, "u1") for name in ("scale_source", "has_texture", "has_code_factor", "zero")),
+        *((name, "<f8") for name in ("metres_per_unit", "metres_sigma")),
+        *((name, "<f8", 3) for name in ("cut_point", "cut_normal")),
+        *((name, "<f4", 3) for name in ("bounds_min", "bounds_max")),
+        ("prior_sha256", "u1", 32),
+    ]
+)  # sdk/src/head/files/file_format.h, version 2
 INFO = ("head", "info", "a.maqh")
 UNCHECKED = ("magic", "check")
 

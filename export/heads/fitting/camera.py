@@ -38,18 +38,6 @@ class ScaledPose:
         ratio = 1 + q[:, 2] * (self.log_scale - self.log_focal).exp()
         return (self.uv + self.log_scale.exp() * q[:, :2]) / ratio[:, None], ratio
 
-    def rays(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
-        """base and direction [N, 3] of pixels from the principal point [N, 2]: base + depth * direction is as much
-        deeper than the origin, dm along the optical axis."""
-        zero, one = pixels.new_zeros(len(pixels), 1), pixels.new_ones(len(pixels), 1)
-        base = torch.cat([(pixels - self.uv) * (-self.log_scale).exp(), zero], 1)
-        along = torch.cat([pixels * (-self.log_focal).exp(), one], 1)
-        return base @ self.rotation, along @ self.rotation
-
-    def eye_depth(self) -> float:
-        """Nothing is seen that is not deeper."""
-        return -float((self.log_focal - self.log_scale).exp())
-
     def displaced(self, step: Tensor) -> ScaledPose:
         """After a step [7], to first order: right in its derivatives at 0."""
         w, none = step[:3], step.new_zeros(())

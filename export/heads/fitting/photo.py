@@ -144,14 +144,6 @@ def shows_head(cells: np.ndarray) -> np.ndarray:
     return usable(cells) & (cells[..., 4] > 0)
 
 
-def read_photo(path: Path) -> np.ndarray:
-    """BGR. Raises NoHead for what is no image, OSError for what cannot be read."""
-    bgr = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_COLOR)
-    if bgr is None:
-        raise NoHead(f"{path} is no picture that can be read; give a JPEG or PNG file.")
-    return bgr
-
-
 def look_at(
     encoder: Encoder, bgr: np.ndarray, box: Box | None = None, roll_rad: float = 0.0, focal_px: float = 0.0
 ) -> HeadPhoto:

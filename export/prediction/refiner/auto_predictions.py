@@ -2,7 +2,7 @@
 
     python -m export.clips.dataset pushing --large --clips 700 --out .data/clips-large
     python -m export.prediction.refiner.auto_predictions --data .data/clips-large --sets pushing collages
-    python -m export.prediction.refiner.auto_predictions --sets pushing people flights --split val
+    python -m export.prediction.refiner.auto_predictions --sets pushing --split val
 
 It is foreseen from frames of 320 x 240 where a clip has some, else from those of 64 x 64, whose edges are rougher, so
 that motion is less exact. A file a clip, OUT/SET/SPLIT/clip-NUMBER.npz: `frames` uint8 [T, 64, 64, 3], R, G, B;

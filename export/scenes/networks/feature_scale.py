@@ -14,7 +14,6 @@ import torch
 from torch import Tensor, nn
 
 from export.scenes.config import COLOURS, FEATURES, RASTER
-from export.scenes.networks.light_refiner import LightRefiner
 from export.scenes.networks.system import Networks
 
 SHARE = 0.999  # of a feature's values are within -0.5 .. 0.5 afterwards
@@ -50,27 +49,17 @@ def factors_between(networks: Networks, image: Tensor, features: Tensor) -> Tens
 
 @torch.no_grad()
 def scaled(networks: Networks, factors: Tensor) -> Networks:
-    """A copy whose learnt features are `factors` [5] times as large and whose images are the same.
-
-    Raises ValueError for the paper's refiner: its borders and gates are not made for 8 bits either.
-    """
-    if not isinstance(networks.refiner, LightRefiner):
-        raise ValueError("features are scaled for light refiners; the gated one stays in float")
+    """A copy whose learnt features are `factors` [5] times as large and whose images are the same."""
     result = copy.deepcopy(networks)
     result.extractor.final.weight *= factors[:, None, None, None]
     refiner = result.refiner
     back = torch.ones(RASTER)
     back[COLOURS:FEATURES] = 1 / factors
-    pixels = 5 if refiner.config.space_to_depth else 1  # four of the finest raster, and the next one's
-    _scale_inputs(refiner.start[0], back.repeat(pixels))
+    _scale_inputs(refiner.start[0], back.repeat(5))  # four pixels of the finest raster, and the next one's
     for width, block in zip(refiner.config.widths, refiner.down, strict=False):
         _scale_inputs(block[0], torch.cat([torch.ones(width), back]))
     return result
 
 
-def _scale_inputs(layer: nn.Module, factors: Tensor) -> None:
-    """layer: a convolution, or a block that begins with one."""
-    while isinstance(layer, nn.Sequential):
-        layer = layer[0]
-    weight = layer.weight
-    weight *= factors[:, None, None, None] if layer.groups > 1 else factors[None, :, None, None]
+def _scale_inputs(layer: nn.Conv2d, factors: Tensor) -> None:
+    layer.weight *= factors[None, :, None, None]

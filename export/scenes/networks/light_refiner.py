@@ -1,10 +1,9 @@
 """A refiner for two CPU cores: a U-Net that begins and ends at half resolution.
 
-What the gated one does, cheaper: the finest raster comes in as four pixels for one and the image goes out so, hence
-nothing but copying is done at full resolution, where the gated one spends a third of its multiply-adds; ReLU instead of
-two convolutions, ELU and a sigmoid, so that convolution and activation are one int8 operation; zeros around the
-borders, which convolutions bring along, where reflecting is an operation of its own; maps from below pass a 1x1
-convolution before they are doubled, not a 3x3 one after it; and pooling and doubling keep the values of int8 maps.
+It is cheaper than the gated U-Net of NPBG++ (arXiv 2203.13318): the finest raster comes in as four pixels for one and
+the image goes out so, hence nothing but copying is done at full resolution; convolution and ReLU are one int8
+operation; borders are zeros, which convolutions bring along; maps from below pass a 1x1 convolution before they are
+doubled; and pooling and doubling keep the values of int8 maps.
 
 What the network computes is added to the colours of the finest raster (`export.scenes.geometry.raster.filled`):
 training starts from an image, and what is rounded to 8 bits is the difference alone.
@@ -34,14 +33,8 @@ def depth_to_space(x: Tensor) -> Tensor:
     return x.reshape(n, 2, 2, c // 4, h, w).permute(0, 3, 4, 1, 5, 2).reshape(n, c // 4, 2 * h, 2 * w)
 
 
-def _block(inputs: int, outputs: int, kind: str) -> nn.Sequential:
-    if kind == "conv":
-        return nn.Sequential(nn.Conv2d(inputs, outputs, 3, padding=1), nn.ReLU(inplace=True))
-    return nn.Sequential(
-        nn.Conv2d(inputs, inputs, 3, padding=1, groups=inputs, bias=False),
-        nn.Conv2d(inputs, outputs, 1),
-        nn.ReLU(inplace=True),
-    )
+def _block(inputs: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(nn.Conv2d(inputs, outputs, 3, padding=1), nn.ReLU(inplace=True))
 
 
 def _doubled(x: Tensor, like: Tensor) -> Tensor:
@@ -60,35 +53,29 @@ class LightRefiner(nn.Module):
     def __init__(self, config: RefinerConfig) -> None:
         super().__init__()
         self.config = config
-        w, block = config.widths, config.block
-        inputs, outputs = (5 * RASTER, 12) if config.space_to_depth else (RASTER, 3)
+        w = config.widths
         # Many channels meet first in a 1x1 convolution, which is a ninth of the work.
-        entry = [nn.Conv2d(inputs, w[0], 1), nn.ReLU(inplace=True)] if config.space_to_depth else []
-        self.start = nn.Sequential(*entry, *_block(w[0] if entry else inputs, w[0], block))
-        self.down = nn.ModuleList(_block(w[k - 1] + RASTER, w[k], block) for k in range(1, len(w)))
-        self.centre = _block(w[-1], w[-1], block)
+        entry = [nn.Conv2d(5 * RASTER, w[0], 1), nn.ReLU(inplace=True)]
+        self.start = nn.Sequential(*entry, *_block(w[0], w[0]))
+        self.down = nn.ModuleList(_block(w[k - 1] + RASTER, w[k]) for k in range(1, len(w)))
+        self.centre = _block(w[-1], w[-1])
         self.lateral = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(len(w) - 1))
-        joined = 2 if config.join == "concat" else 1
-        self.up = nn.ModuleList(_block(joined * w[k], w[k], block) for k in range(len(w) - 1))
-        self.final = nn.Conv2d(w[0], outputs, 3, padding=1)
+        self.up = nn.ModuleList(_block(2 * w[k], w[k]) for k in range(len(w) - 1))
+        self.final = nn.Conv2d(w[0], 12, 3, padding=1)
         nn.init.normal_(self.final.weight, std=0.01)
         nn.init.zeros_(self.final.bias)
 
     def forward(self, rasters: list[Tensor]) -> Tensor:
-        if self.config.space_to_depth:
-            return depth_to_space(self.of_rearranged([space_to_depth(rasters[0]), *rasters[1:]]))
-        return self.of_rearranged(rasters)
+        return depth_to_space(self.of_rearranged([space_to_depth(rasters[0]), *rasters[1:]]))
 
     def of_rearranged(self, rasters: list[Tensor]) -> Tensor:
-        """As `forward`, but with space_to_depth the first raster comes and the image leaves rearranged."""
-        count = 2 if self.config.space_to_depth else 1
-        skips = [self.start(torch.cat(rasters[:count], 1) if count > 1 else rasters[0])]
-        for block, raster in zip(self.down, rasters[count : self.config.levels], strict=True):
+        """As `forward`, but the first raster comes and the image leaves rearranged."""
+        skips = [self.start(torch.cat(rasters[:2], 1))]
+        for block, raster in zip(self.down, rasters[2 : self.config.levels], strict=True):
             skips.append(block(torch.cat([F.max_pool2d(skips[-1], 2), raster], 1)))
         x = self.centre(skips.pop())
         for lateral, block in zip(reversed(self.lateral), reversed(self.up), strict=True):
             skip = skips.pop()
-            x = self.double(lateral(x), skip)
-            x = block(torch.cat([x, skip], 1) if self.config.join == "concat" else x + skip)
-        firsts = range(0, rasters[0].shape[1], RASTER)
+            x = block(torch.cat([self.double(lateral(x), skip), skip], 1))
+        firsts = range(0, 4 * RASTER, RASTER)
         return torch.cat([rasters[0][:, first : first + COLOURS] for first in firsts], 1) + self.final(x)

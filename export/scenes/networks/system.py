@@ -12,7 +12,9 @@ from torch import nn
 from export.scenes.config import ExtractorConfig, RefinerConfig, SceneConfig
 from export.scenes.networks.basis import Basis
 from export.scenes.networks.extractor import Extractor
-from export.scenes.networks.refiner import make_refiner
+from export.scenes.networks.light_refiner import LightRefiner
+
+_PARTS = {"extractor": ExtractorConfig, "refiner": RefinerConfig}
 
 
 class Networks(nn.Module):
@@ -23,15 +25,12 @@ class Networks(nn.Module):
         self.config = config
         self.extractor = Extractor(config.extractor)
         self.basis = Basis()
-        self.refiner = make_refiner(config.refiner)
+        self.refiner = LightRefiner(config.refiner)
 
 
 def config_of(saved: dict[str, Any]) -> SceneConfig:
     """Restores a SceneConfig from the dict of `asdict` that a file stored."""
-    extractor, refiner = saved["extractor"], saved["refiner"] | {"widths": tuple(saved["refiner"]["widths"])}
-    if "folded" in refiner:  # the name in weights of before
-        refiner["space_to_depth"] = refiner.pop("folded")
-    return SceneConfig(ExtractorConfig(tuple(extractor["widths"])), RefinerConfig(**refiner))
+    return SceneConfig(*(kind(tuple(saved[name]["widths"])) for name, kind in _PARTS.items()))
 
 
 def save_networks(networks: Networks, path: Path) -> None:

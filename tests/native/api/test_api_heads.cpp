@@ -46,7 +46,7 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndLandmarks) {
   // narrower by 1.105 and taller by 1 / 0.895; no photo tells its size.
   const maq_head_landmark crown = head.landmark("crown"), left = head.landmark("pupil_left");
   EXPECT_NEAR(2 * left.point_m[0] / crown.point_m[2], 63.7 / 121 * 0.895 / 1.105, 0.015);
-  // By the anchors it is 1 mm, and the photo leaves more of the depth than of the height (export.heads.fit says as
+  // By the anchors it is 1 mm, and the photo leaves more of the depth than of the height (a fit in torch says as
   // much).
   EXPECT_NEAR(crown.sigma_m, 0.0021, 1e-4);
   EXPECT_NEAR(head.landmark("nose_tip").sigma_m, 0.0031, 1e-4);

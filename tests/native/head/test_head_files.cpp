@@ -1,4 +1,4 @@
-// Heads on disk: what is written is what is read, by Python too (tests/python/heads/test_head_file.py); damage; disks
+// Heads on disk: what is written is what is read; damage; disks
 // that are full.
 #include <gtest/gtest.h>
 

@@ -12,6 +12,7 @@ if not maquette.library_path().exists():
     pytest.skip(f"{maquette.library_path()} is not built: run `make build`", allow_module_level=True)
 
 import torch
+from code_sampler import drawn_code
 
 from export.bundle import BundleInfo
 from export.clips.shapes import shapes_clip
@@ -19,7 +20,6 @@ from export.prediction.bundle import TRANSFORMER
 from export.prediction.code_file import FrameCodes, prior_of, read_code_file
 from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
-from export.prediction.graphs.code_sampler import drawn_code
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import read_transformer_file
 from export.prediction.motion_images import MotionJob, motion_pictures

@@ -1,4 +1,4 @@
-// Which part of a depth frame may have an edge: what a plane does not explain within the sensor's noise.
+// Finds the part of a depth frame that may have an edge: depth that is not flat within the sensor's noise.
 //
 // Noise is measured locally by second differences of inverse depth along rows: an edge affects few of them, white noise
 // affects all. Noise that neighbours share is underestimated, which costs time but no edge.
@@ -13,9 +13,9 @@ namespace maq {
 
 class ActiveWindow {
  public:
-  // The part for the network to run on, with sides that are half of the frame's or all of it, multiples of
-  // `multiple_px`: all areas of 32 x 32 px that a plane does not explain, or whose depth is known in part, with what
-  // lies within eps_r of them and some context. No width: there is none.
+  // The part for the network, with half or all of each side of the frame, in multiples of `multiple_px`: all areas of
+  // 32 x 32 px that are not flat or have partly known depth, with a margin of eps_r and some context. No width: there
+  // is none.
   FieldWindow find(const DepthPlane& depth, const Intrinsics& intrinsics, int multiple_px, WorkerThreads& threads);
 
  private:

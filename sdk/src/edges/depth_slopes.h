@@ -17,8 +17,8 @@ struct DepthPlane {
   int width_px = 0, height_px = 0;
 };
 
-// A part of a frame, which may reach beyond its right and lower border by less than what it has of the frame. No width:
-// none.
+// A part of a frame, which may reach beyond the right and lower border by less than its size inside of the frame. No
+// width: none.
 struct FieldWindow {
   int left_px = 0, top_px = 0, width_px = 0, height_px = 0;
 };
@@ -33,7 +33,7 @@ class DepthSlopes {
   // and in y, in metres of depth a metre sideways, 0 where either pixel is unknown and where the window ends with the
   // frame. Plane 2: 1 where depth is known. Beyond the frame's border the planes are mirrored, so that surfaces go on
   // there: unknown depth would look like their end. `values` has room for count(window) of them. Takes no memory for a
-  // window no larger than those before.
+  // window that is not larger than earlier windows.
   void make(const DepthPlane& depth, const Intrinsics& intrinsics, const FieldWindow& window, WorkerThreads& threads,
             float* values);
   static size_t count(const FieldWindow& window) {

@@ -59,9 +59,9 @@ class Edges {
   // another size, with values that are not finite or a focal length that is not positive; MAQ_ERROR_IMAGE_SIZE,
   // MAQ_ERROR_BAD_BUNDLE, MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
   void run(const ImageView& depth, const Intrinsics& intrinsics, EdgesResult& result);
-  // Computes the field of a depth frame, or of the depth that came with a colour frame. Uses the frame's intrinsics,
-  // which may be those of the colour image: it shows the same view. Ignores distortion. Throws MAQ_ERROR_UNSUPPORTED
-  // for a frame without intrinsics.
+  // Computes the field of a depth frame, or of the depth that came with a colour frame. Uses the frame's intrinsics.
+  // These may be the colour image's, which shows the same view. Ignores distortion. Throws MAQ_ERROR_UNSUPPORTED for a
+  // frame without intrinsics.
   void run(const Frame& frame, EdgesResult& result);
   // Returns the number of threads in use.
   int threads() const { return network_.threads(); }

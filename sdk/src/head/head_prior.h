@@ -34,7 +34,7 @@ struct HeadAnchors {
   std::vector<float> template_points;  // [count][3], dm, in the template head's frame
   std::vector<float> mean;             // [count][3], dm
   std::vector<float> linear;           // [count][3][shape codes]: A, dm a unit of a code
-  std::vector<float> sigma;            // [count], dm: what the linear function leaves, each coordinate
+  std::vector<float> sigma;            // [count], dm: residual of the linear function, for each coordinate
 
   size_t count() const { return sigma.size(); }
 };

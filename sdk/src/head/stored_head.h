@@ -19,7 +19,7 @@ inline constexpr size_t kMaxStoredCameras = 256;
 // How large a head is. The values are stored: new ones come at the end.
 enum class ScaleSource : uint8_t {
   kPrior,  // as large as heads are on average
-  kGiven,  // by the app: a distance that it knows, such as that of the pupils
+  kGiven,  // by the app: a known distance, such as between the pupils
   kDepth,  // by a depth camera
 };
 
@@ -51,7 +51,7 @@ struct StoredHead {
   explicit StoredHead(FieldWeights of_head) : weights(std::move(of_head)) {}
 
   FieldWeights weights;  // combined
-  FieldCodes codes;      // what they were combined from, for a fit that goes on
+  FieldCodes codes;      // the codes of these weights, for another fit
   // How sure the photos made the shape codes: the Cholesky factor of their covariance, lower triangle, row by row.
   // Empty: not known, and no photo can be added.
   std::vector<float> code_factor;

@@ -21,7 +21,7 @@ struct CurveStation {
   int near_side;                      // the side that ends at the edge; -1: both
   double gap_r;                       // of side 1 behind side 0 along the ray
   double field_gap_px;                // by how much farther away the field has an edge on side 1 than on side 0
-  std::array<int, 2> boundary_votes;  // pixels of the field near it that say boundary, less those that say crease
+  std::array<int, 2> boundary_votes;  // pixels near it with the kind boundary, minus pixels with the kind crease
   bool is_known;                      // it has a point
   Vec3 point;
   double sigma_r;  // of the point, the worst of its directions
@@ -45,8 +45,8 @@ class CurveStations {
   // Returns false if no surface is known beside the chain.
   bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain, const CurveOptions& options);
 
-  // After measure(): two edges, one behind the other, are one chain. Stations and runs become those of the farther one;
-  // false where there is none.
+  // After measure(): two edges, one behind the other, are one chain. Stations and runs become the farther one's;
+  // returns false if there is none.
   bool measure_far_side(const EdgeField& field);
 
  private:

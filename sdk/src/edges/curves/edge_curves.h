@@ -1,5 +1,5 @@
 // Sharp feature curves of one or several depth frames: lines, circular arcs and cubic B-splines, and the corners where
-// they meet. Coordinates are those of the camera or of the world.
+// they meet. Coordinates are in the camera or in the world.
 #pragma once
 
 #include <array>

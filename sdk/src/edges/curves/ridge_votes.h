@@ -11,7 +11,7 @@ namespace maq {
 // kept as its double angle, so that the two sides of a crease agree.
 struct RidgeVotes {
   int width = 0, height = 0;
-  std::vector<float> weight;      // votes: 1 on an edge of which one side is seen, 2 where both are
+  std::vector<float> weight;      // votes: 1 on an edge with one visible side, 2 with both
   std::vector<float> cos2, sin2;  // weight * double angle of the direction across the edge
   std::vector<float> scratch;     // a row each of the smoothing
 

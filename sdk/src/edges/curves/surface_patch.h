@@ -11,7 +11,7 @@ namespace maq {
 // The inverse depth of a plane is linear in the pixel for any tilt. A curved patch also has squares.
 struct SurfacePatch {
   int terms = 0;                        // 0: no surface is known, 3: a plane, 6: with squares
-  double x = 0, y = 0;                  // px: the place around which it was fitted
+  double x = 0, y = 0;                  // px: the position around which it was fitted
   std::array<double, 6> coefficient{};  // of 1, u, v, uu, uv, vv with u, v = (pixel - place) / kPatchScale_px; 1/m
   double rms_footprints = 0;            // of the pixels' depth from it, along the ray
   double edge_sigma_r = 0;              // of its depth at (x, y), along the ray
@@ -30,16 +30,16 @@ struct BandPixel {
   double across;  // px from the edge
 };
 
-// Sums of a plane's normal equations, so that those of several bands can be added.
+// Sums of a plane's normal equations, which can be added for several bands.
 struct PlaneSums {
-  double x = 0, y = 0, unit = 0;  // px: their place; 1/m: an inverse depth about that of the pixels
+  double x = 0, y = 0, unit = 0;  // px: their position; 1/m: about the inverse depth of the pixels
   std::array<double, 6> a{};      // 1, u, v, uu, uv, vv
   std::array<double, 3> b{};
   double squares = 0, weight = 0;
 
   void begin(double at_x, double at_y, double inverse_depth);
   void add(const BandPixel& pixel);
-  void add(const PlaneSums& other);  // of the same place
+  void add(const PlaneSums& other);  // of the same position
   // Returns terms = 0 if the sums do not determine a plane. `edge`: the point for edge_sigma_r.
   SurfacePatch solve(double focal_px, double edge_x, double edge_y) const;
 };

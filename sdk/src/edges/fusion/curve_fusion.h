@@ -33,8 +33,8 @@ class CurveFusion {
   // Adds the curves of a view, in the coordinates of its camera.
   void add_view(const EdgeCurves& curves, const PinholeCamera& pose);
 
-  // Curves of all views, in the world; what is computed is computed from `origin`, which is amid the cameras. The order
-  // of views has no effect but on rounding. Fused curves know no planes.
+  // Curves of all views, in the world; computations are relative to `origin`, which is amid the cameras. The order of
+  // views has no effect but on rounding. Fused curves know no planes.
   void fuse(const std::array<double, 3>& origin, EdgeCurves& result) const;
 
  private:

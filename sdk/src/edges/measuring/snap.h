@@ -1,4 +1,4 @@
-// The corner, edge or plane at a pixel or on a ray: what a pointer snaps to.
+// Finds the corner, edge or plane at a pixel or on a ray, for a pointer that snaps.
 #pragma once
 
 #include "edges/curves/edge_curves.h"

@@ -33,18 +33,18 @@ struct EncoderSpec {
   int crop_px() const { return cells.side * cells.cell_px; }
 };
 
-// Null where the bundle has none. Throws as HeadBundle does, and what read_template() throws.
+// Null where the bundle has none. Throws the errors of HeadBundle and read_template().
 std::shared_ptr<const HeadTemplate> template_of_bundle(const Bundle& bundle);
 
 struct HeadBundle {
-  // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE where the manifest lacks what is
-  // read, or the graph's input or output is not that of the format; what read_prior() throws.
+  // Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE if the manifest lacks a key, or the
+  // graph's input or output differs from the format, and the errors of read_prior().
   explicit HeadBundle(Bundle opened);
 
   Bundle bundle;  // without the bytes of prior and template
   EncoderSpec encoder;
   HeadPrior prior;
-  std::array<uint8_t, 32> prior_sha256;               // of its file: what stored heads name
+  std::array<uint8_t, 32> prior_sha256;               // of its file; stored heads name it
   std::shared_ptr<const HeadTemplate> template_head;  // may be null
 
   const GraphSpec& encoder_graph() const;

@@ -27,12 +27,12 @@ enum class PoseStatus {
   kFound,
   kAmbiguous,     // another rotation explains the points almost as well: the better one is given
   kTooFewPoints,  // less than 4 usable correspondences
-  kCollinear,     // the points do not hold the rotation: on a line, in one place, or too close for their noise
+  kCollinear,     // the points do not determine the rotation: on a line, at one position, or too close for their noise
   kNoConsensus,   // no camera explains enough of them
-  kMirrored,      // only a mirrored picture does, or, the same to the pixels, a head behind the camera
+  kMirrored,      // only a mirrored image fits, or a head behind the camera, which gives the same pixels
 };
 
-// A sentence for who took the photo: what of the head ("it") is seen.
+// A sentence for the photographer: the visible part of the head ("it").
 const char* pose_status_text(PoseStatus status);
 
 struct CameraPose {
@@ -49,8 +49,8 @@ struct CameraPose {
 };
 
 // Deterministic. Up to 60 % of the correspondences may be outliers, as long as more are left than chance would bring
-// together: that takes some 20 points; of 10 points 30 % may be. Those with numbers that are not finite or beyond 1e6,
-// or whose weight or sigma is not positive, are left out and counted. All inliers lie in front of the camera.
+// together: that takes some 20 points; of 10 points 30 % may be. Points with numbers that are not finite or beyond 1e6,
+// or with a weight or sigma that is not positive, are left out and counted. All inliers lie in front of the camera.
 // Throws MAQ_ERROR_INVALID_ARGUMENT unless the options are finite, the focal length positive, its sigma within 0..3 and
 // the fraction within 0..1.
 CameraPose find_camera_pose(const std::vector<Correspondence>& points, const CameraPoseOptions& options);

@@ -1,4 +1,4 @@
-// The camera of a picture of a head.
+// The camera of an image of a head.
 #pragma once
 
 #include "head/camera/se3.h"
@@ -9,7 +9,7 @@ namespace maq::head {
 struct HeadCamera {
   RigidMotion head_to_camera;  // decimetres
   double focal_px = 0, cx_px = 0, cy_px = 0;
-  int width_px = 0, height_px = 0;  // of the picture; 0 where that does not matter
+  int width_px = 0, height_px = 0;  // of the image; 0 if it does not matter
 };
 
 }  // namespace maq::head

@@ -7,7 +7,7 @@
 
 namespace maq::head {
 
-// A camera by what it does at an origin within the points, at depth z: N = (u, v) + s q_xy, pixel = N / (1 + q_z s /
+// A camera by its projection at an origin within the points, at depth z: N = (u, v) + s q_xy, pixel = N / (1 + q_z s /
 // f), with q = R (p - origin) and s = f / z. Far away, f leaves the equations and only its prior holds it, while u, v
 // and s stay.
 struct ScaledPose {
@@ -18,7 +18,7 @@ struct ScaledPose {
 };
 
 inline constexpr int kPoseUnknowns = 7;         // rotation (3), u, v, log scale, log focal
-inline constexpr double kMinDepthRatio = 1e-3;  // of the depth at the origin: what is nearer is not seen
+inline constexpr double kMinDepthRatio = 1e-3;  // of the depth at the origin: nearer points are not visible
 
 // The derivatives of a pixel.
 struct PixelJacobian {
@@ -28,7 +28,7 @@ struct PixelJacobian {
 
 struct SeenPoint {
   Vec3 turned;         // R (p - origin)
-  double depth_ratio;  // of its depth to that of the origin
+  double depth_ratio;  // of its depth to the depth of the origin
   double x_px, y_px;   // from the principal point
 
   bool is_seen() const { return depth_ratio > kMinDepthRatio; }
@@ -74,8 +74,8 @@ inline ScaledPose moved(const ScaledPose& pose, const double* step) {
   return to;
 }
 
-// A turn of more than a radian, or a scale of more than e^2, leaves what the equations of a step know of. False for
-// NaN.
+// A rotation of more than a radian, or a scale of more than e^2, is outside of the range of a step's equations. False
+// for NaN.
 inline bool is_small_step(const double* step) {
   return std::sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) < 1 && std::abs(step[5]) < 2 &&
          std::abs(step[6]) < 2;

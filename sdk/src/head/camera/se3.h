@@ -59,7 +59,7 @@ inline RigidMotion inverse(const RigidMotion& m) {
   return {back, -(back * m.translation)};
 }
 
-// (angle - sin) / angle^3 and its two next of kin, which cancel near 0: what exp's derivatives are made of.
+// (angle - sin) / angle^3 and its two relatives, which cancel near 0: the parts of exp's derivatives.
 struct AngleFactors {
   double cubic, quartic, quintic;
 };

@@ -45,7 +45,7 @@ enum class WeightGradient {
   kNone,
   kPersonal,
   kPersonalGeometry,  // the personal layers of one of the networks
-  kPersonalSurface,   // and what this costs: the geometry is gone through for the points alone
+  kPersonalSurface,   // and its cost: the geometry runs only for the points
   kAll
 };
 
@@ -54,7 +54,7 @@ class FieldWorkspace {
  private:
   friend class FieldEngine;
 
-  AlignedFloats blocks_;            // of all blocks, what backward() needs
+  AlignedFloats blocks_;            // of all blocks, for backward()
   AlignedFloats scratch_;           // of one block
   std::vector<uint64_t> left_out_;  // of each block that is kept: its points that have a value that is not finite
   size_t count_ = 0;                // of points that are kept
@@ -82,13 +82,13 @@ class FieldEngine {
   void distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
                  const Planes& gradient = {}) const;
 
-  // Keeps what backward() needs in the workspace, until the next call with it.
+  // Keeps the values for backward() in the workspace, until the next call with this workspace.
   void forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const;
   // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). A gradient by
   // the normal needs second derivatives: it costs as much again as the geometry's other part. May be called more than
   // once. Points that have a value or a gradient that is not finite are left out: they have no part in the sums, and 0
-  // as their gradient; returns how many. Throws MAQ_ERROR_INTERNAL where forward() kept
-  // nothing, or did not compute what a gradient is given by.
+  // as their gradient; returns how many. Throws MAQ_ERROR_INTERNAL if forward() kept nothing, or did not compute a
+  // value with a given gradient.
   size_t backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
                   FieldWeights* weights, const Planes& points_gradient = {}) const;
 
@@ -97,7 +97,7 @@ class FieldEngine {
     size_t forward, backward, bias;  // in packed_
     int inputs, outputs;
   };
-  // Blocks of one call, within the workspace: of max_rows_ rows, of 3, and those of tangents.
+  // Blocks of one call, within the workspace: of max_rows_ rows, of 3, and of tangents.
   struct Scratch {
     float *a, *b, *c, *transposed, *points, *direction, *tangents, *bends;
   };
@@ -119,7 +119,7 @@ class FieldEngine {
   Block block(FieldWorkspace& workspace, size_t begin) const;
 
   const Layer& layer(int index) const { return layers_[size_t(index)]; }
-  // The activations of the i-th hidden layer of the geometry, or what lies as they do.
+  // The activations of the i-th hidden layer of the geometry, or arrays with the same layout.
   float* hidden(float* rows, int i) const { return rows + size_t(i) * size_t(shape_.width * kFieldBlock); }
   float* surface_hidden(float* rows, int i) const {
     return rows + size_t(i) * size_t(shape_.surface_width * kFieldBlock);
@@ -136,7 +136,7 @@ class FieldEngine {
   bool wants(const Sums& sums, int index) const;
   void add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
                            bool has_bias = true) const;
-  // From scratch.a, the gradient by what the network gave, to that by its input, again in scratch.a.
+  // Converts scratch.a from the gradient by the network's output to the gradient by its input.
   void surface_backward(const Block& at, const Sums& sums, Scratch& scratch) const;
   // From scratch.a, the gradient by what the output layer gave (of which `used` rows), to that by the encoding, unless
   // that is not asked for.

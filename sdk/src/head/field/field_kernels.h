@@ -25,7 +25,7 @@ struct FieldKernels {
   void (*encode_tangent_backward)(const float* encoding, const float* direction, const float* gradient, int octaves,
                                   float* points_gradient);
 
-  // Weights [rows][stride], of which `depth` columns, in the order in which multiply() reads them: rows * depth floats.
+  // Weights [rows][stride], of which `depth` columns, in the order of multiply(): rows * depth floats.
   void (*pack)(const float* weights, size_t stride, int rows, int depth, float* packed);
   // The same of the transpose of weights [depth][stride]: rows * depth floats.
   void (*pack_transposed)(const float* weights, size_t stride, int rows, int depth, float* packed);
@@ -39,7 +39,7 @@ struct FieldKernels {
 
   // The gradient by the input of squareplus, from its output (out) and the gradient by the output.
   void (*activation_backward)(const float* out, int rows, float smoothing, const float* gradient, float* result);
-  // tangent: of what it was given -> of what it gave; bend gets a'' times the former.
+  // tangent: of the input -> of the output; bend gets a'' times the input's tangent.
   void (*activation_tangent)(const float* out, int rows, float smoothing, float* tangent, float* bend);
   // activation_backward() of both: by_tangent, from the gradient by the tangent to `result`, and in `gradient` that by
   // the value, which has a part by the tangent's slope.

@@ -74,8 +74,8 @@ inline Vector squareplus(Vector v, Vector smoothing) {
 
 enum class From { kZero, kBias, kSum };
 
-// Rows by kTileVectors vectors of c = a b, or what From says besides: all of it in registers. a's row r at depth k is
-// a[r * row_step + k * depth_step].
+// Rows by kTileVectors vectors of c = a b, or the variant of From: all of it in registers. a's row r at depth k is a[r
+// * row_step + k * depth_step].
 template <int kRows, int kVectors, int kRowStep, int kDepthStep, From kFrom, bool kActivated>
 inline __attribute__((always_inline)) void tile(const float* a, int depth, const float* b, size_t b_stride,
                                                 const float* bias, float* c, size_t c_stride, float smoothing) {
@@ -280,7 +280,7 @@ void weight_gradient(const float* gradient, int outputs, const float* in, int in
 // Sine and cosine of the angle minus the nearest multiple of pi / 2, which is subtracted in three parts (Cody and
 // Waite), by polynomials of Cephes (sinf, cosf).
 inline void sine_and_cosine(Vector angle, Vector& sine, Vector& cosine) {
-  const Vector rounding = broadcast(12582912.0f);  // 1.5 * 2^23: rounds what it is added to
+  const Vector rounding = broadcast(12582912.0f);  // 1.5 * 2^23: rounds the number that it is added to
   const Vector quarters = multiply_add(angle, broadcast(0.636619772f), rounding);
   const Mask quarter = reinterpret_cast<const Mask&>(quarters);
   const Vector whole = rounding - quarters;

@@ -27,8 +27,8 @@ class FieldParts {
   Part& part(int index) { return parts_[size_t(index)]; }
 
   // Splits `items` (rays, say) into neighbouring ranges, each but the last a multiple of `whole` long, and calls
-  // work(part) for each that is not empty; what it throws is thrown. Work that goes through its range in batches of a
-  // few hundred points keeps them in the core's second cache.
+  // work(part) for each that is not empty; its exceptions are passed on. Work that goes through its range in batches of
+  // a few hundred points keeps them in the core's second cache.
   template <class Work>
   void run(WorkerThreads& threads, size_t items, size_t whole, Work&& work) {
     begin(items, whole);

@@ -18,7 +18,7 @@ struct FieldShape {
   int surface_width = 64;
   int surface_layers = 2;  // hidden ones
   float smoothing = 2e-4f;
-  // The layers that differ from head to head: so many first ones of either network.
+  // The layers that differ from head to head: the first ones of each network.
   int personal_geometry_layers = 3;
   int personal_surface_layers = 1;
 
@@ -38,7 +38,7 @@ struct FieldShape {
 inline constexpr int kSurfaceOutputs = 6;
 inline constexpr int kMaxOctaves = 8, kMaxFieldWidth = 256, kMaxFieldLayers = 8;
 
-// Throws MAQ_ERROR_UNSUPPORTED where a size is beyond what the engine takes.
+// Throws MAQ_ERROR_UNSUPPORTED for a size beyond the engine's limits.
 void check_field_shape(const FieldShape& shape);
 
 // Rows of weights are padded to a multiple of this.

@@ -1,5 +1,5 @@
 // The bytes of a prior (.maqp), of a stored head (.maqh) and of the template head (.maqt). Numbers are little-endian,
-// as on every machine that the SDK runs on. Behind the head of each file follow, without gaps, what its comment lists.
+// as on every machine that the SDK runs on. The parts in the comment of each head follow it without gaps.
 #pragma once
 
 #include <cstddef>

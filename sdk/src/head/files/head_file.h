@@ -16,18 +16,17 @@ inline constexpr uint64_t kMaxHeadFileBytes = uint64_t(8) << 20;
 // anchors. Throws MAQ_ERROR_INVALID_ARGUMENT for a head with a fault (stored_head_fault), or weights beyond 65504.
 std::vector<uint8_t> head_file_bytes(const StoredHead& head);
 
-// Replaces a file of that name atomically, once the new one is complete and on the disk. Throws what head_file_bytes()
-// and AtomicFile throw.
+// Replaces a file of that name atomically, once the new one is complete and on the disk. Throws the errors of
+// head_file_bytes() and AtomicFile.
 void write_head_file(const StoredHead& head, const std::string& path);
 
-// `bytes` may be null where `count` is 0, and are not needed afterwards. `name` begins the sentence of errors. Whatever
-// the bytes, also those of a hostile file with a right checksum: what comes back has no fault, and takes at most some
-// eight times the file's memory. Throws MAQ_ERROR_UNREADABLE for what is not a head, truncated or damaged;
-// MAQ_ERROR_UNSUPPORTED for another version than 1 and 2, a field that the engine does not take, or more than
-// kMaxHeadFileBytes.
+// `bytes` may be null where `count` is 0, and are not needed afterwards. `name` begins the sentence of errors. Hostile
+// bytes with a correct checksum are safe too: the result has no fault, and takes at most some eight times the file's
+// memory. Throws MAQ_ERROR_UNREADABLE for a file that is not a head, truncated or damaged; MAQ_ERROR_UNSUPPORTED for
+// another version than 1 and 2, a field that the engine does not take, or more than kMaxHeadFileBytes.
 StoredHead read_head(const void* bytes, size_t count, const std::string& name);
 
-// Throws what read_file() throws besides.
+// Also throws the errors of read_file().
 StoredHead read_head_file(const std::string& path);
 
 }  // namespace maq::head

@@ -23,7 +23,7 @@ class StoredBytes : public CheckedBytes {
   using CheckedBytes::CheckedBytes;
   using CheckedBytes::floats;
 
-  // All of these throw as those of CheckedBytes do.
+  // All of these throw like the functions of CheckedBytes.
   void floats(StoredFormat format, float* to, size_t count);  // of kFloat32 or kFloat16
   std::vector<float> floats(StoredFormat format, size_t count);
   // The weights and biases of one layer of some heads, in order.
@@ -31,7 +31,7 @@ class StoredBytes : public CheckedBytes {
   std::vector<NamedPoint> landmarks(size_t count);
 };
 
-// Throws the reader's damage for what no shape has, MAQ_ERROR_UNSUPPORTED as check_field_shape() does.
+// Throws the reader's damage for impossible shapes, MAQ_ERROR_UNSUPPORTED as check_field_shape() does.
 FieldShape checked_shape(const StoredShape& stored, const StoredBytes& bytes);
 StoredShape stored_shape(const FieldShape& shape);
 

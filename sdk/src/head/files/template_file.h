@@ -11,10 +11,10 @@ namespace maq::head {
 
 inline constexpr uint64_t kMaxTemplateFileBytes = uint64_t(8) << 20;
 
-// `bytes` may be null where `count` is 0, and are not needed afterwards. `name` begins the sentence of errors. Whatever
-// the bytes, also those of a hostile file with a right checksum: what comes back has no fault, and takes at most some
-// eight times the file's memory. Throws MAQ_ERROR_BAD_BUNDLE for what is not a template, truncated or damaged;
-// MAQ_ERROR_UNSUPPORTED for another version, or more than kMaxTemplateFileBytes.
+// `bytes` may be null where `count` is 0, and are not needed afterwards. `name` begins the sentence of errors. Hostile
+// bytes with a correct checksum are safe too: the result has no fault, and takes at most some eight times the file's
+// memory. Throws MAQ_ERROR_BAD_BUNDLE for a file that is not a template, truncated or damaged; MAQ_ERROR_UNSUPPORTED
+// for another version, or more than kMaxTemplateFileBytes.
 HeadTemplate read_template(const void* bytes, size_t count, const std::string& name);
 
 }  // namespace maq::head

@@ -45,9 +45,8 @@ struct AnchorFit {
 };
 
 // One head, seen in one or more photos. Deterministic. About linear in the number of cells; the codes squared and the
-// photos are in the equations.
-// Throws MAQ_ERROR_INVALID_ARGUMENT for no photos or more than kMaxFitPhotos, and as find_camera_pose() does for what
-// is known of a camera.
+// photos are in the equations. Throws MAQ_ERROR_INVALID_ARGUMENT for no photos or more than kMaxFitPhotos, and the
+// errors of find_camera_pose() for the known values of a camera.
 inline constexpr size_t kMaxFitPhotos = 64;
 AnchorFit fit_anchors(const HeadPrior& prior, const std::vector<HeadPhoto>& photos,
                       const AnchorFitOptions& options = {});

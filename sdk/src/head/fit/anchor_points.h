@@ -20,7 +20,7 @@ class AnchorPoints {
     std::array<double, kNeighbours> weights{};  // their sum is 1
     double distance_dm = 0;                     // of the nearest
     Vec3 mean;                                  // where the point lies with codes of 0
-    double sigma_dm = 0;                        // what the linear function leaves, each coordinate
+    double sigma_dm = 0;                        // residual of the linear function, for each coordinate
   };
 
   // Keeps a reference; of a prior that check_head_prior() accepts.

@@ -11,10 +11,10 @@
 
 namespace maq::head {
 
-// The noise of a cell: that of its template point (the encoder's sigma) and of the anchors near it, in decimetres, and
-// of the pixel. Each cell's squared error e, in sigmas, costs e / (1 + e / limit) (Geman-McClure).
+// The noise of a cell: of its template point (the encoder's sigma) and of the anchors near it, in decimetres, and of
+// the pixel. Each cell's squared error e, in sigmas, costs e / (1 + e / limit) (Geman-McClure).
 struct AnchorTermOptions {
-  size_t max_cells = 1000;  // of a photo, spread evenly over those that are usable
+  size_t max_cells = 1000;  // of a photo, spread evenly over the usable ones
   double min_matte = 0.5;
   double cell_weight = 0.15;   // of a cell's cost: neighbours say the same
   double pixel_sigma = 0.3;    // of where in its cell the encoder saw the point, in cells
@@ -24,7 +24,7 @@ struct AnchorTermOptions {
   double face_border = 1;
 };
 
-// The costs of one photo. The pose's origin is that of the head's frame.
+// The costs of one photo. The pose's origin is the origin of the head's frame.
 class AnchorTerms {
  public:
   AnchorTerms(const HeadPhoto& photo, const AnchorPoints& points, const AnchorTermOptions& options);

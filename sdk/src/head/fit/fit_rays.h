@@ -1,4 +1,4 @@
-// The pixels of a photo that a head is fitted to, as rays with what is observed there.
+// The pixels of a photo that a head is fitted to, as rays with observations.
 #pragma once
 
 #include <cstddef>
@@ -22,19 +22,19 @@ struct FitRay {
 
 struct FitRays {
   std::vector<FitRay> fitted, held_out;
-  double cells_per_ray = 0;  // how many of the encoder's cells one of them stands for
+  double cells_per_ray = 0;  // number of the encoder's cells for each ray
 };
 
 struct FitRayOptions {
-  int side_px = 64;  // the crop is looked at with so many pixels a row
+  int side_px = 64;  // pixels in a row of the crop
   double held_out_fraction = 0.05;
   int margin_cells = 5;  // pixels farther than this from all cells of the head are left out
   uint64_t seed = 1;
 };
 
 // Adds the rays of a photo. Squares of 3x3 cells are held out, the same for any side_px: the next pixel over would
-// tell. The colour is the mean of the crop's pixels, and none on the matte's edge; template points and normals lie
-// between those of four cells of the head that agree with each other.
+// tell. The colour is the mean of the crop's pixels, and unknown on the mask's edge. Template points and normals are
+// interpolated between four cells of the head that agree with each other.
 void add_fit_rays(const HeadPhoto& photo, uint32_t index, const FitRayOptions& options, FitRays& rays);
 
 }  // namespace maq::head

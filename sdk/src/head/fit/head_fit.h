@@ -1,5 +1,5 @@
 // A head fitted to photos: stage 0 from template points (anchor_fit.h), then stage 1, Adam on codes and cameras with
-// what the pixels say along rays, until the time, the steps or the gain end.
+// the pixels' losses along rays, until the time, the steps or the gain end.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ struct HeadFitOptions {
   double held_out_fraction = 0.05;
   int check_steps = 10, patience = 3;
   double min_gain = 1e-3;
-  uint64_t seed = 1;  // of the order of the rays, and of those held out
+  uint64_t seed = 1;  // of the order of the rays, and of the held-out pixels
 };
 
 enum class HeadFitEnd {

@@ -37,7 +37,7 @@ struct CellGrid {
   int cell_px = 4;  // of the crop; the centre of cell (i, j) is that of cell_px x cell_px of its pixels
 };
 
-// A photo of a head, and what is known of its camera.
+// A photo of a head, and the known values of its camera.
 struct HeadPhoto {
   HeadObservations seen;
   std::optional<HeadObservations> face;  // of the second pass; none if no face is seen

@@ -24,7 +24,7 @@ class RayOpacity {
   double log_transmittance() const { return log_transmittance_; }
   double opacity() const;  // the sum of the weights
 
-  // From the loss's derivatives by each weight and by log_transmittance() to those by each distance
+  // Converts the loss's derivatives by each weight and by log_transmittance() to derivatives by each distance
   // (`by_distances` [sections + 1], overwritten) and by the sharpness (added). Of the latest run.
   void back(const float* by_weights, double by_log_transmittance, float* by_distances, double& by_sharpness) const;
 
@@ -40,10 +40,10 @@ class RayOpacity {
   std::vector<double> log_clear_, after_;   // of sections: log(1 - alpha), transmittance behind it
 };
 
-// The colour of a ray: the sum of weights times colours [sections][3]. What is behind it is the caller's.
+// The colour of a ray: the sum of weights times colours [sections][3]. The caller adds the background.
 std::array<float, 3> blend_colours(const std::vector<float>& weights, const float* colours);
 
-// From the loss's derivative by that colour to those by the colours (overwritten) and by the weights (added).
+// Converts the loss's derivative by that colour to derivatives by the colours (overwritten) and by the weights (added).
 void blend_colours_back(const std::vector<float>& weights, const float* colours, const std::array<float, 3>& by_colour,
                         float* by_colours, float* by_weights);
 

@@ -1,4 +1,4 @@
-// Rays through a picture's pixels in the head's frame, and how their points move with the camera.
+// Rays through an image's pixels in the head's frame, and how their points move with the camera.
 #pragma once
 
 #include <cmath>

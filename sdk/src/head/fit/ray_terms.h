@@ -63,7 +63,7 @@ class RayTerms {
 
  private:
   static constexpr int kParts = 4;
-  static constexpr size_t kRays = 16;  // at once, so that what is kept stays in a core's second cache
+  static constexpr size_t kRays = 16;  // at once: kept values stay in a core's second cache
 
   using Columns = std::array<std::vector<float>, 3>;
   struct Sample {

@@ -1,9 +1,9 @@
 // Which triangles marching cubes puts into a cell, for each of the 256 ways in which its corners lie inside or outside.
 //
-// On a face whose corners alternate, those inside are separated: a rule of the face alone, so that both of its cells
-// agree (Nielson and Hamann 1991 decide it by the values instead). Each cell's segments on its faces form loops, and no
-// triangle's side but those segments joins two points of one face. So each side belongs to exactly two triangles: two
-// of one cell, or one of each cell of a face. All 256 cells have such triangles, at most five (tests/native/head).
+// On a face with alternating corners, the inside corners are separated. The rule depends only on the face, so both of
+// its cells agree (Nielson and Hamann 1991 decide it by the values instead). Each cell's segments on its faces form
+// loops, and only these segments join two points of one face. So each side belongs to exactly two triangles: two of one
+// cell, or one of each cell of a face. All 256 cells have such triangles, at most five (tests/native/head).
 #pragma once
 
 #include <array>

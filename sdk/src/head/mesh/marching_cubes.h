@@ -1,9 +1,9 @@
 // The surface of a signed distance as a mesh: marching cubes in the cells that the distance cannot exclude.
 //
 // The mesh is closed and manifold whatever the field is, and its triangles have an area: corners of value 0 count as
-// outside, vertices keep off the grid's corners by kMinFraction of a cell, the table is that of cube_triangles.h, and
-// what the box cuts is closed along the box. Where the field is steeper than it is said to be, a piece of the surface
-// can be missed, but none is left open: cells are added wherever the surface goes on.
+// outside, vertices keep off the grid's corners by kMinFraction of a cell, the table is in cube_triangles.h, and a
+// surface that leaves the box is closed along the box. Where the field is steeper than it is said to be, a piece of the
+// surface can be missed, but none is left open: cells are added wherever the surface goes on.
 #pragma once
 
 #include <array>
@@ -42,8 +42,8 @@ struct MarchingCubesStats {
 
 // Positions and triangles of the surface; empty where the field has none in the box. The same for any number of
 // threads. Throws MAQ_ERROR_INVALID_ARGUMENT for a box or cell that is not finite, not positive or gives more than
-// kMaxCellsPerAxis, and where the field is not a number; MAQ_ERROR_OUT_OF_MEMORY beyond `max_points`; what the field
-// throws; std::bad_alloc.
+// kMaxCellsPerAxis, and where the field is not a number; MAQ_ERROR_OUT_OF_MEMORY beyond `max_points`; the field's
+// errors; std::bad_alloc.
 HeadMesh marching_cubes(const ScalarField& field, const MarchingCubesOptions& options, WorkerThreads& threads,
                         MarchingCubesStats* stats = nullptr);
 

@@ -12,15 +12,15 @@
 
 namespace maq::head {
 
-// Keeps the piece with the largest area, of equal ones that with the first triangle, and the order of what is kept.
+// Keeps the piece with the largest area (of equal ones the one with the first triangle), in its order.
 void keep_largest_piece(HeadMesh& mesh);
 
 // Writes the field's gradient at each of `count` points to `gx`, `gy` and `gz`. Called as ScalarField is.
 using GradientField =
     std::function<void(const float* x, const float* y, const float* z, float* gx, float* gy, float* gz, size_t count)>;
 
-// Sets the normals to the gradient's direction; where the gradient is 0 or not finite, to that of the triangles around
-// the vertex.
+// Sets the normals to the gradient's direction; where the gradient is 0 or not finite, to the normal of the triangles
+// around the vertex.
 void set_normals(HeadMesh& mesh, const GradientField& gradient, WorkerThreads& threads);
 
 // Sets the normals to the mean of the triangles around each vertex, by area; (0, 0, 1) where they have none.

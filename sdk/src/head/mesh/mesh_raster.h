@@ -23,7 +23,7 @@ enum class MeshShading {
 };
 
 struct RasterOptions {
-  float near = 0.05f;  // what is nearer is not drawn; in the mesh's unit
+  float near = 0.05f;  // nearer points are not drawn; in the mesh's unit
   // Where the light comes from, in the camera; of length 1. Over the viewer's left shoulder.
   std::array<float, 3> light = {-0.36f, -0.48f, -0.8f};
   float ambient = 0.35f;                          // of the colour, without light
@@ -41,11 +41,11 @@ struct RasterOptions {
 class MeshRaster {
  public:
   // Draws both sides of each triangle. Colours, normals and template points are interpolated between its vertices,
-  // correct in perspective; a mesh without normals gets those of its triangles. The nearest triangle is seen; of
+  // correct in perspective; a mesh without normals gets its triangles' normals. The nearest triangle is seen; of
   // equally near ones the first. `image` has the mesh's colours, not weighed by alpha. Triangles without an area are
-  // skipped. With smooth edges a pixel's depth, normal and template point are those of what is nearest in it. The same
-  // for any number of threads. Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE
-  // for images of no pixels or more than 16384 a side.
+  // skipped. With smooth edges a pixel has the depth, normal and template point of its nearest sample. The same for any
+  // number of threads. Throws MAQ_ERROR_INVALID_ARGUMENT for a camera that is not finite, MAQ_ERROR_IMAGE_SIZE for
+  // images of no pixels or more than 16384 a side.
   void draw(const HeadMesh& mesh, const HeadCamera& camera, const RasterOptions& options, WorkerThreads& threads,
             RenderedImage& image);
 

@@ -1,4 +1,4 @@
-// A picture that meshes are drawn with by their texture coordinates.
+// An image that meshes are drawn with, by their texture coordinates.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ class MeshTexture {
   // Copies a BGR8 image.
   explicit MeshTexture(const ImageView& bgr);
 
-  // The level whose texels are about as large as pixels, for a surface that `texels` of the whole picture and `pixels`
-  // of the drawn one cover; 0 is the whole picture, each further level half as wide and high.
+  // The level whose texels are about as large as pixels, for a surface that `texels` of the whole texture and `pixels`
+  // of the drawn one cover; 0 is the whole texture, each further level half as wide and high.
   int level_of(double texels, double pixels) const;
 
   // R, G, B, 0 to 255, between the four nearest texels of a level; (u, v): to the right and down, 0 to 1.

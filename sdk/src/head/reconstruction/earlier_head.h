@@ -12,14 +12,14 @@ namespace maq::head {
 // Lower triangle L of L L^T = `covariance` [codes][codes], row by row; empty where it is not positive.
 std::vector<float> covariance_factor(const std::vector<float>& covariance, size_t codes);
 
-// The heads of `prior` by codes u that are normal a priori as long as the earlier head's photos are all that is known:
-// shape codes z + L u, with the head's own z and what its photos left of them; colour codes z + u, as a photo in other
+// Describes the heads of `prior` by codes u with a normal prior, given the earlier head's photos. Shape codes are z + L
+// u, with the head's z and the remaining covariance after its photos. Colour codes are z + u, because a photo in other
 // light may change them. So a fit with `prior` counts each earlier photo's cells, but not its pixels again.
 class EarlierHead {
  public:
   // `prior_sha256`: of the prior's file. Throws MAQ_ERROR_UNSUPPORTED for a head that was fitted with another prior or
-  // whose file does not say how sure its codes are; MAQ_ERROR_INVALID_ARGUMENT for codes that no head has, and where
-  // it has so many cameras that kMaxFitPhotos more are too many.
+  // that has no covariance of its codes; MAQ_ERROR_INVALID_ARGUMENT for codes that no head has, and where it has so
+  // many cameras that kMaxFitPhotos more are too many.
   EarlierHead(const HeadPrior& prior, const std::array<uint8_t, 32>& prior_sha256, StoredHead head);
 
   const HeadPrior& prior() const { return prior_; }

@@ -45,14 +45,14 @@ struct HeadBuildStats {
 
 class HeadBuilder {
  public:
-  // `texture`: heads get one, unless its side is 0. Throws what HeadBundle and HeadEncoder throw.
+  // `texture`: heads get one, unless its side is 0. Throws the errors of HeadBundle and HeadEncoder.
   HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle, const SessionSettings& settings,
               const TextureOptions& texture = {0, false});
   HeadBuilder(const HeadBuilder&) = delete;
   HeadBuilder& operator=(const HeadBuilder&) = delete;
 
   // On failure nothing changes. Throws MAQ_ERROR_INVALID_ARGUMENT for hints that no photo of that size can have, and
-  // for more than kMaxFitPhotos; MAQ_ERROR_NOT_FOUND where no head is seen; what HeadEncoder::run() throws.
+  // for more than kMaxFitPhotos; MAQ_ERROR_NOT_FOUND if no head is visible, and the errors of HeadEncoder::run().
   void add_photo(const ImageView& photo, const PhotoHints& hints);
   // Uses a head of the same person as prior; it replaces an earlier one. On failure nothing changes. Throws the errors
   // of EarlierHead.

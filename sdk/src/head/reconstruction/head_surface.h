@@ -29,10 +29,10 @@ struct SurfaceStats {
 };
 
 // Marching cubes of max(the field's distance, that to the cut plane), so that the head is closed below the chin; of
-// this the largest piece, simplified. Normals are the gradient of what is larger of the two. Lengths are true
-// decimetres: those of the head's frame times its scale. The same for any number of threads. Throws
-// MAQ_ERROR_INVALID_ARGUMENT for a cell beyond the limits, or of which more than kMaxCellsPerAxis would be needed;
-// MAQ_ERROR_UNSUPPORTED where the field has no surface in its domain; what marching_cubes() throws.
+// this the largest piece, simplified. Normals are the gradient of the larger value of the two. Lengths are true
+// decimetres: lengths in the head's frame times its scale. The same for any number of threads. Throws
+// MAQ_ERROR_INVALID_ARGUMENT for a cell beyond the limits, or too small for kMaxCellsPerAxis; MAQ_ERROR_UNSUPPORTED if
+// the field has no surface in its domain; and the errors of marching_cubes().
 HeadMesh head_surface(const StoredHead& head, const SurfaceOptions& surface, WorkerThreads& threads,
                       SurfaceStats* stats = nullptr);
 

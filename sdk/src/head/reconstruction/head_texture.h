@@ -1,4 +1,4 @@
-// The texture of a fitted head: the part of a photo that it takes, and its picture from these.
+// The texture of a fitted head: the part of each photo that it uses, and the texture from these parts.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ struct TextureSource {
   HeadCamera camera;
 };
 
-// As a JPEG file. `earlier`: of the same head before these photos, in place of the network's colours; empty: there is
-// none. Throws what head_surface(), decode_image() and JpegEncoder throw.
+// As a JPEG file. `earlier`: texture of the same head before these photos, which replaces the network's colours; empty:
+// none. Throws the errors of head_surface(), decode_image() and JpegEncoder.
 StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
                            const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier = {});
 

@@ -8,8 +8,8 @@
 
 namespace maq::head {
 
-// How much the size of heads differs, as a fraction of it: what the codes, whitened, do to the anchors' mean distance
-// from their middle.
+// Standard deviation of the size of heads, as a fraction of the size: the effect of the whitened codes on the anchors'
+// mean distance from their middle.
 double size_sigma(const HeadPrior& prior);
 
 // Anchors of shape codes with this covariance, [codes][codes]. Sigmas include the part of a point that the codes do not

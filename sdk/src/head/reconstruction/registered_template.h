@@ -10,8 +10,8 @@
 
 namespace maq::head {
 
-// As head_surface() has it: true decimetres, colours, template points; normals are those of the mesh. It is open at the
-// neck. `registration`: what register_template() says of itself. The same for any number of threads.
+// Like head_surface(): true decimetres, colours, template points; normals are the mesh's. It is open at the neck.
+// `registration`: statistics of register_template(). The same for any number of threads.
 HeadMesh registered_template(const StoredHead& head, const HeadTemplate& onto, WorkerThreads& threads,
                              TemplateRegistration* registration = nullptr);
 

@@ -26,9 +26,9 @@ struct TemplateRegistration {
 };
 
 // `starts`: about where each point of the template lies on the head, [points][3]. `head` has no fault. From there
-// points of the surface go along the gradient to distance 0 and across it by what their template point is off, held
-// together by the mean displacement of their neighbours, less and less. Where the field is no number, or has the point
-// nowhere near, and where triangles would flip, the neighbours decide, as they do for skin inside (harmonic
+// points of the surface go along the gradient to distance 0 and across it by the residual of their template point. The
+// mean displacement of their neighbours holds them together, less and less. Where the field is no number, or has the
+// point nowhere near, and where triangles would flip, the neighbours decide, as they do for skin inside (harmonic
 // displacement); eyeballs, teeth and tongue keep their form. The same for any number of threads of `field`.
 TemplateRegistration register_template(const HeadTemplate& head, const std::vector<float>& starts,
                                        const RegistrationField& field);

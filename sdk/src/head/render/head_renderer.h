@@ -25,18 +25,18 @@ struct HeadRenderOptions {
 
 class HeadRenderer {
  public:
-  // The mesh is in decimetres, as head_surface() makes it; the texture, if any, is drawn in place of its colours.
-  // Throws MAQ_ERROR_UNSUPPORTED for a mesh without triangles.
+  // The mesh is in decimetres, as head_surface() makes it. A texture replaces its colours. Throws MAQ_ERROR_UNSUPPORTED
+  // for a mesh without triangles.
   HeadRenderer(HeadMesh mesh, std::optional<MeshTexture> texture, const HeadRenderOptions& options);
 
   void set_shading(MeshShading shading) { options_.shading = shading; }
 
-  // The world is the head's frame in metres, as are the image's lengths. Throws what check_camera() throws.
+  // The world is the head's frame in metres, as are the image's lengths. Throws the errors of check_camera().
   void render(const PinholeCamera& camera, RenderedImage& image);
 
   // A camera that sees the whole head, whichever way it is turned, 30 degrees wide along the image's shorter side.
   // `yaw_rad`: how far it stands to the person's left of the front, `pitch_rad`: how far above. Throws
-  // MAQ_ERROR_INVALID_ARGUMENT for angles that are not finite, and what check_image_size() throws.
+  // MAQ_ERROR_INVALID_ARGUMENT for angles that are not finite, and the errors of check_image_size().
   PinholeCamera orbit_camera(double yaw_rad, double pitch_rad, int width_px, int height_px) const;
 
  private:

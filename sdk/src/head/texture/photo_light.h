@@ -16,7 +16,7 @@ struct ChannelLight {
   Vec3 directed;
 
   float operator()(float own, const float* normal) const;  // within 0 to 255
-  double strength(const float* normal) const;              // what own colours are multiplied by
+  double strength(const float* normal) const;              // factor of own colours
 
   // The colour `seen` if the light had this strength everywhere; within 0 to 255. Where hardly any light falls, the
   // strength is unknown and counts as a quarter of `even`.
@@ -26,9 +26,9 @@ struct ChannelLight {
 using PhotoLight = std::array<ChannelLight, 3>;
 
 // By weighted least squares, over points of a surface: `weights` [n], 0 where the photo does not see it; `own` colours,
-// `differences` of the photo's from them, and unit `normals` [n][3]. What the points do not determine stays near a
-// plain gain: own colours that hardly vary tell no gain from an offset, and few normals no direction. Nothing seen:
-// nothing is changed.
+// `differences` of the photo's from them, and unit `normals` [n][3]. Undetermined parameters stay near a plain gain:
+// nearly equal colours cannot separate gain and offset, and few normals give no direction. Nothing seen: nothing is
+// changed.
 PhotoLight fit_photo_light(const std::vector<float>& weights, const std::vector<float>& own,
                            const std::vector<float>& differences, const std::vector<float>& normals);
 

@@ -39,11 +39,11 @@ struct TextureImage {
 
 // `mesh` has normals, colours and texture coordinates (texture_layout.h). A texel shows the outermost surface that lies
 // there. A photo counts for it as far as the surface faces it, no other part of the mesh is before it, and the matte
-// says that it is the head; finer photos more. What a photo differs from the mesh's colours by is blended; its mean
-// over the photo is made the same for all photos. What no photo sees has the mesh's colours in the photos' light
-// (photo_light.h), and what its surroundings still differ by, less with the distance: so there is no step. The same for
-// any number of threads. `earlier`: what the head looked like before these photos, of any size; its colours take the
-// place of the mesh's. Of 0 pixels: there is none.
+// says that it is the head; finer photos more. Differences between photos and the mesh's colours are blended; their
+// mean is made the same for all photos. Parts that no photo shows have the mesh's colours in the photos' light
+// (photo_light.h), plus the remaining difference of their surroundings, which fades with the distance: there is no
+// step. The same for any number of threads. `earlier`: texture of the head before these photos, of any size; its
+// colours replace the mesh's. Of 0 pixels: there is none.
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
                           WorkerThreads& threads, const TextureImage& earlier = {});
 

@@ -3,8 +3,8 @@
 // corner.
 //
 // A direction from a point in the neck's axis, at the angle a from the upward one, lies sin(a / 2) from the middle of
-// the disc: equal solid angles have equal areas there (Lambert's azimuthal projection). Folds of the surface, as behind
-// the ears and below hanging hair, share their place with what lies outside of them.
+// the disc: equal solid angles have equal areas there (Lambert's azimuthal projection). Folds of the surface, such as
+// behind the ears and below hanging hair, share their texels with the surface outside of them.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ namespace maq::head {
 // (u, v) of a point of the template head in decimetres: u to the right, v down, within 0 to 1.
 std::array<float, 2> texture_place(Vec3 template_point);
 
-// Whether the place is one of the cap.
+// Whether the position is in the cap.
 bool is_in_cap_disc(float u, float v);
 
 // Sets the texture coordinates of a mesh with template points. `is_cap`: of each vertex (find_cap); triangles of three

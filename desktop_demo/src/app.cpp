@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kMaxOutfitPx = 4096;
-// Between two frames, while the picture moves and while nothing happens.
+// Between two frames, while the image moves and while nothing happens.
 constexpr double kMovingS = 0.016, kIdleS = 0.25;
 constexpr float kArrowSpeed = 1.5f, kDragSpeed = 0.005f;  // radians a second, radians a unit of the window
 
@@ -80,7 +80,7 @@ void App::draw_frame(double seconds) {
 
 void App::take_drops() {
   for (const std::string& path : window_.take_drops()) {
-    // In the try-on view a dropped picture is something to wear.
+    // In the try-on view a dropped image is something to wear.
     if (view_ == &people_ && people_.is_trying_on()) {
       load_outfit(path);
     } else {
@@ -124,7 +124,7 @@ void App::steer(float seconds, const Rect& area) {
   view_->steer(steering, area);
 }
 
-// Over the picture: why there is none, what is being done, what was saved.
+// Over the image: why there is none, what is being done, what was saved.
 void App::draw_message(const Rect& area) {
   std::string text = view_->message();
   const std::string saved = saver_.message();

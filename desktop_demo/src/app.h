@@ -47,7 +47,7 @@ class App {
   HeadView head_;
   LiveView* live_ = &people_;  // or &edges_, &prediction_: shown, or behind the scene
   MainView* view_ = &people_;  // live_, &scene_ or &head_
-  bool seeks_head_ = false;    // of the first picture
+  bool seeks_head_ = false;    // of the first image
   bool shows_panel_ = true, shows_help_ = false;
   maquette::TripleBuffer<maquette::RgbaImage> outfits_;
   maquette::Saver saver_;  // last: its jobs use the others

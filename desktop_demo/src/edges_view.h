@@ -1,4 +1,4 @@
-// Edges of a depth camera, a recording or a depth picture, live: depth in colours with curves over it, sizes of boxes,
+// Edges of a depth camera, a recording or a depth image, live: depth in colours with curves over it, sizes of boxes,
 // and what the pointer is at.
 #pragma once
 

@@ -17,8 +17,8 @@ enum class Action {
   kOpenCamera,
   kOtherView,
   kPrediction,
-  kHead,       // of the person in the picture
-  kAddToHead,  // the picture, for the head so far
+  kHead,       // of the person in the image
+  kAddToHead,  // the image, for the head so far
   kBack,       // to the live view
   kExport,     // the head
   kSnapshot,

@@ -28,7 +28,7 @@ constexpr double kMinAheadMs = 33, kMaxAheadMs = 1000;
 struct Options {
   std::string source = kFirstCamera;  // or a file, a folder with a capture
   bool edges = false;                 // of the source, rather than people
-  bool head = false;                  // of the person in its first picture
+  bool head = false;                  // of the person in its first image
   bool predict = false;               // the source with its predicted frames
   maquette::PredictionChoice prediction;
   maq_head_shading shading = MAQ_HEAD_SHADING_COLOUR;

@@ -7,7 +7,7 @@ Action Panel::draw(const Rect& rect, MainView& view, bool has_clip) {
   ImGui::SetNextWindowPos({float(rect.x), float(rect.y)});
   ImGui::SetNextWindowSize({float(rect.width), float(rect.height)});
   ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize);
-  if (ImGui::IsWindowAppearing()) ImGui::SetWindowFocus(nullptr);  // arrows are the picture's at first
+  if (ImGui::IsWindowAppearing()) ImGui::SetWindowFocus(nullptr);  // arrows are the image's at first
   ImGui::PushItemWidth(-110 * window_.scale());
   Action action = view.draw_panel();
   draw_load();

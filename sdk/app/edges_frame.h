@@ -19,7 +19,7 @@ struct EdgesPick {
 
 struct EdgesFrame {
   RgbaImage picture;
-  EdgeLayer layer = EdgeLayer::kDepth;        // that the picture is of
+  EdgeLayer layer = EdgeLayer::kDepth;        // that the image is of
   std::shared_ptr<const EdgesResult> result;  // null before the first frame
   std::shared_ptr<const EdgesCurves> found;   // null where curves were not asked for; the others then are empty
   std::vector<maq_edges_curve> curves;        // their pointers are of `found`

@@ -31,7 +31,7 @@ struct LiveOptions {
   bool real_time = true;     // clips and stubs play at their own pace and begin anew; else as fast as the model runs
   uint64_t max_results = 0;  // 0: no end
   int32_t reconnect_ms = 86400000;  // how long a lost camera is waited for
-  int32_t max_side_px = 2048;       // larger pictures of files are made smaller
+  int32_t max_side_px = 2048;       // larger images of files are made smaller
   int32_t nice = 5;                 // so that the thread that draws goes first
   double frame_budget_ms = 0;       // of dense pose (maq_densepose_model_set_frame_budget)
 };

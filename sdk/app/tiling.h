@@ -1,4 +1,4 @@
-// Pictures of one shape beside and below each other.
+// Images of one shape beside and below each other.
 #pragma once
 
 #include <algorithm>
@@ -7,10 +7,10 @@ namespace maquette {
 
 struct Tiling {
   int columns = 0, rows = 0;
-  int width = 0, height = 0;  // of a picture
+  int width = 0, height = 0;  // of an image
 };
 
-// As large as `count` pictures of `picture_width` : `picture_height` get in an area.
+// As large as `count` images of `picture_width` : `picture_height` get in an area.
 inline Tiling tile(int count, int area_width, int area_height, int picture_width, int picture_height) {
   Tiling best;
   for (int columns = count; columns >= 1; --columns) {

@@ -1,4 +1,4 @@
-// Draws pictures of people, of scenes and of the body into the window, from textures that it keeps.
+// Draws images of people, of scenes and of the body into the window, from textures that it keeps.
 #pragma once
 
 #include <app/mapped_frame.h>
@@ -13,7 +13,7 @@ class Painter {
   ~Painter();
 
   void set_frame(const maquette::MappedFrame& frame);
-  // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any picture, which is
+  // Worn in the try-on view: an atlas of 4 x 6 charts in the DensePose layout (2 : 3), or any image, which is
   // repeated over the body's front and back.
   void set_outfit(const maquette::RgbaImage& outfit);
   void set_body(const maquette::DensePoseMesh& body);

@@ -1,7 +1,7 @@
-// GLSL 3.30: pictures of people, and the body that turns in the corner.
+// GLSL 3.30: images of people, and the body that turns in the corner.
 #pragma once
 
-// Covers the viewport with one triangle; `at` is in the picture, from its top left corner, 0 to 1.
+// Covers the viewport with one triangle; `at` is in the image, from its top left corner, 0 to 1.
 constexpr char kPictureVertexShader[] = R"(#version 330 core
 out vec2 at;
 void main() {

@@ -1,4 +1,4 @@
-// Pictures of a result: the people over their frame, each pixel in the colour of its body part.
+// Images of a result: the people over their frame, each pixel in the colour of its body part.
 #pragma once
 
 #include <cstddef>

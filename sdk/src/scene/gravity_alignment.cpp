@@ -16,7 +16,7 @@ PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<doub
   const double across = (r[0] * up[0] + r[1] * up[1] + r[2] * up[2]) / length;
   const double down = (r[3] * up[0] + r[4] * up[1] + r[5] * up[2]) / length;
   const double seen = std::hypot(across, down);
-  // Nearly along the axis its direction in the picture says less and less; the rotation fades out.
+  // Nearly along the axis its direction in the image says less and less; the rotation fades out.
   constexpr double kFaintest = 0.05;
   const double angle = std::atan2(across, -down) * std::min(1.0, seen / kFaintest);
   const double cosine = std::cos(angle), sine = std::sin(angle);

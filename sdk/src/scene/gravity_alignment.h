@@ -13,7 +13,7 @@ namespace maq {
 // world's up is along the optical axis, and continuous near that.
 PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up);
 
-// The camera rotated about its axis until up is up, with the smallest frame that holds its whole picture and has sides
+// The camera rotated about its axis until up is up, with the smallest frame that holds its whole image and has sides
 // that are multiples of `multiple`. Throws MAQ_ERROR_INVALID_ARGUMENT where that is a million pixels away from the
 // first one.
 PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::array<double, 3>& up, int multiple);

@@ -1,4 +1,4 @@
-// Sizes of pictures on the command line, such as 640x480.
+// Sizes of images on the command line, such as 640x480.
 #pragma once
 
 #include <string>

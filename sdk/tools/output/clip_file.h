@@ -1,4 +1,4 @@
-// Drawn pictures as a clip, of the kind that this build can write.
+// Drawn images as a clip, of the kind that this build can write.
 #pragma once
 
 #include <filesystem>

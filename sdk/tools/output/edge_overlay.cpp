@@ -67,7 +67,7 @@ class Drawing {
     cv::putText(canvas_, text, at, cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar::all(255), 2, cv::LINE_AA);
   }
 
-  // Pixels of the field are squares of `scale` pixels; what is far outside of the picture is drawn no farther.
+  // Pixels of the field are squares of `scale` pixels; what is far outside of the image is drawn no farther.
   cv::Point fixed(const double* p) const {
     const auto at = [&](double field_px, int side) {
       const double px = (field_px + 0.5) * scale_ - 0.5;

@@ -1,4 +1,4 @@
-// The picture of a field of edges: depth in colours, shaded, with sharp pixels, curves and boxes drawn over it.
+// The image of a field of edges: depth in colours, shaded, with sharp pixels, curves and boxes drawn over it.
 #pragma once
 
 #include <maquette/maquette.hpp>

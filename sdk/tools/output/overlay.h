@@ -1,4 +1,4 @@
-// The picture of a dense pose result: parts in colour, iso-contours of U and V, outlines, boxes with scores.
+// The image of a dense pose result: parts in colour, iso-contours of U and V, outlines, boxes with scores.
 #pragma once
 
 #include <maquette/maquette.hpp>

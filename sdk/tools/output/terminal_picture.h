@@ -1,4 +1,4 @@
-// Pictures in a terminal: two pixels a character, in true colour.
+// Images in a terminal: two pixels a character, in true colour.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@ bool terminal_shows_pictures();
 
 class TerminalPicture {
  public:
-  // The picture with a line of text below, over the one before; at most ten a second, more are left out. What is
+  // The image with a line of text below, over the one before; at most ten a second, more are left out. What is
   // printed afterwards starts on its own line.
   void show(const maquette::Frame& frame, const std::string& line);
 

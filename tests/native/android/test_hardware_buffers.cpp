@@ -1,4 +1,4 @@
-// Hardware buffers as frames and as pictures to draw on, on an Android in memory.
+// Hardware buffers as frames and as images to draw on, on an Android in memory.
 #include <gtest/gtest.h>
 
 #include <functional>

@@ -1,4 +1,4 @@
-// Results on a window of Android, on an Android in memory: pictures, failures, and windows that go while they are
+// Results on a window of Android, on an Android in memory: images, failures, and windows that go while they are
 // drawn.
 #include <gtest/gtest.h>
 

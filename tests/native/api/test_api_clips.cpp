@@ -135,7 +135,7 @@ TEST_F(ApiClips, AFullDiskIsToldAndLeavesTheOldFile) {
     const rlim_t whole = std::filesystem::file_size(path);
     std::filesystem::remove(path);
     write(path, 2);
-    // In the head, among the pictures, in the index behind them, at the last byte.
+    // In the head, among the images, in the index behind them, at the last byte.
     for (const rlim_t most : {rlim_t(0), rlim_t(20), rlim_t(10'000), whole / 2, whole - 200, whole - 1}) {
       maquette::Clip clip(context_, path, 10);
       const FileSizeLimit full(most);

@@ -1,4 +1,4 @@
-// Pictures of results: people over their frame, and alone.
+// Images of results: people over their frame, and alone.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kWidth = 320, kHeight = 256;
 
-// A person (make_tiny_bundle.py: of a red cell) in a picture of many colours.
+// A person (make_tiny_bundle.py: of a red cell) in an image of many colours.
 class ApiDrawing : public ::testing::Test {
  protected:
   ApiDrawing() { maq_densepose_drawing_init(&drawing_, sizeof drawing_); }

@@ -1,4 +1,4 @@
-// Pictures and results as files: what is in them, and that they are whole or not there.
+// Images and results as files: what is in them, and that they are whole or not there.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -178,7 +178,7 @@ TEST_F(ApiSaving, AFullDiskLeavesTheOldFiles) {
   nobody.save(folder_.file("a"));
   const std::string json = read_text(folder_.file("a.json")), inds = read_text(folder_.file("a_INDS.png"));
   {
-    const FileSizeLimit full(300);  // the JSON has room, pictures do not
+    const FileSizeLimit full(300);  // the JSON has room, images do not
     EXPECT_EQ(status_of([&] { somebody.save(folder_.file("a")); }), MAQ_ERROR_UNWRITABLE);
   }
   EXPECT_EQ(read_text(folder_.file("a.json")), json);

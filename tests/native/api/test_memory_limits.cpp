@@ -377,7 +377,7 @@ TEST(MemoryLimits, AFileIsNotDamagedWhereThereIsTooLittleMemoryForIt) {
         return write(pipe, said.data(), said.size()) == ssize_t(said.size()) ? 0 : 2;
       });
       EXPECT_EQ(outcome.trouble, "") << uri << ", " << bytes << " bytes more";
-      // A picture has one frame.
+      // An image has one frame.
       is_done = outcome.said.rfind("MAQ_OK", 0) == 0 || outcome.said.rfind("MAQ_END_OF_STREAM", 0) == 0;
       const bool tells = outcome.said.rfind("MAQ_ERROR_OUT_OF_MEMORY ", 0) == 0;
       EXPECT_TRUE(is_done || tells) << uri << ", " << bytes << " bytes more: " << outcome.said;

@@ -80,7 +80,7 @@ void expect_same(const maq_pinhole_camera& a, const maq_pinhole_camera& b, doubl
   EXPECT_NEAR(a.intrinsics.cy_px, b.intrinsics.cy_px, tolerance);
 }
 
-// Where a point of the world lies in the picture; the third number is its depth.
+// Where a point of the world lies in the image; the third number is its depth.
 Vec3 seen(const maq_pinhole_camera& camera, const Vec3& point) {
   const Vec3 away = sum(point, scaled(position(camera), -1));
   const double x = dot(row(camera, 0), away), y = dot(row(camera, 1), away), z = dot(row(camera, 2), away);
@@ -213,7 +213,7 @@ TEST(FlyCamera, FromStraightUpOrDownItTurnsTheWayThePictureDoes) {
       fly.rotate(0, -forward * 0.5);
       const maq_pinhole_camera camera = fly.camera(640, 480);
       expect_rotation(camera);
-      // From straight down upwards goes to the picture's upper edge, from straight up downwards to its lower one.
+      // From straight down upwards goes to the image's upper edge, from straight up downwards to its lower one.
       EXPECT_NEAR(dot(row(camera, 2), row(start, 1)), forward * std::sin(0.5), 1e-6);
       EXPECT_NEAR(dot(row(camera, 0), row(start, 0)), 1, 1e-6);
     }

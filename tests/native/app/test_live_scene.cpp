@@ -72,14 +72,14 @@ maq_pinhole_camera small_camera(const maquette::LiveScene& scene) {
   return fly.camera(160, 120);
 }
 
-// A picture that comes after this call.
+// An image that comes after this call.
 const maquette::LiveSceneImage* render_at(maquette::LiveScene& scene, const maq_pinhole_camera& camera,
                                           int photo_index = -1) {
   scene.render(camera, photo_index);
   return wait_until([&] { return scene.images().take(); }) ? &scene.images().front() : nullptr;
 }
 
-// Nothing comes in the time in which a small picture is rendered many times.
+// Nothing comes in the time in which a small image is rendered many times.
 void expect_no_image(maquette::LiveScene& scene) {
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   EXPECT_FALSE(scene.images().take());

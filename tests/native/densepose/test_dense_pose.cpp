@@ -298,7 +298,7 @@ TEST_F(DensePose, ACropIsTheDenseHeadsAnswerForTheBodyOfTheFirst) {
   expect_sane(again, 320, 256);
 }
 
-// A tiny bundle whose crops have networks of their own: those of the whole picture, but U is everywhere `u`.
+// A tiny bundle whose crops have networks of their own: those of the whole image, but U is everywhere `u`.
 class BundleWithCropNetworks : public BundleCopy {
  public:
   explicit BundleWithCropNetworks(float u) {

@@ -20,7 +20,7 @@ class Providers : public ::testing::Test {
     fake_->other_nodes = 20;
   }
 
-  // Runs the tiny bundle over a picture of one person, on two threads.
+  // Runs the tiny bundle over an image of one person, on two threads.
   maq::DensePoseResult run(const std::string& library, maq_provider provider) {
     const auto take = [](void* lines, maq_log_level, const char* text) {
       *static_cast<std::string*>(lines) += std::string(text) + "\n";

@@ -170,7 +170,7 @@ class ShippedNetworks : public ::testing::Test {
     }
   }
 
-  static constexpr int64_t kSide = 256;  // of the picture that single graphs are asked about
+  static constexpr int64_t kSide = 256;  // of the image that single graphs are asked about
 
   // The photo as the trunk takes it, [1, 3, kSide, kSide].
   static std::vector<float> trunk_input() {

@@ -225,7 +225,7 @@ TEST(CurveExtraction, IsFreeOfScale) {
 TEST(CurveExtraction, WorksAtAnyFocalLength) {
   CurveExtractor extractor;
   for (const double focal : {10.0, 60.0, 300.0, 10000.0}) {
-    // The box as large in the picture as it was: nearer by as much as the field of view is wider.
+    // The box as large in the image as it was: nearer by as much as the field of view is wider.
     SolidScene scene;
     scene.add_box({0, 0, 0}, {0.5, 0.36, 0.3}, 0.6, -1);
     const double away = std::max(0.45, 1.3 * focal / 300);

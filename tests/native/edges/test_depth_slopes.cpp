@@ -117,7 +117,7 @@ TEST(DepthSlopes, FocalLengthsFrom10To10000AndPixelsThatAreNotSquareGiveTheSameS
     for (const double ratio : {1.0, 0.5, 1.7}) {
       const Intrinsics camera{8, 6, focal_px, ratio * focal_px, -40, 900};  // the principal point is outside
       Plane plane{0.3, -0.2, 1};
-      plane.c -= plane.inverse(camera, 4, 3) - 1;  // at 1 m in the picture
+      plane.c -= plane.inverse(camera, 4, 3) - 1;  // at 1 m in the image
       const Unfolded found = slopes_of(depth_of(plane, camera), camera);
       // Depth of 24 bits at 1 m: a slope is uncertain by the focal length times 2^-23.
       const double tolerance = 1e-5 + 4 * focal_px * 6e-8;

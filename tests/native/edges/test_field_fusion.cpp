@@ -56,7 +56,7 @@ PinholeCamera camera_at(std::array<double, 3> centre, std::array<double, 9> rota
 
 constexpr std::array<double, 9> kBackward = {-1, 0, 0, 0, 1, 0, 0, 0, -1};  // looks along -z
 
-// A wall a metre before the camera, with an edge along the picture's middle row.
+// A wall a metre before the camera, with an edge along the image's middle row.
 PosedField wall(const PinholeCamera& camera, bool has_edge = true) {
   return posed_field(camera, [&](int, int y) {
     return std::pair{1.0f, has_edge ? float(0.9 * std::abs(y - camera.cy_px)) : kEps};

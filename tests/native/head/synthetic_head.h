@@ -275,7 +275,7 @@ inline double rotation_error(const HeadCamera& a, const HeadCamera& b) {
       maq::head::log_rotation(a.head_to_camera.rotation * maq::head::transposed(b.head_to_camera.rotation)));
 }
 
-// Camera points of a picture's pixels, near and far, in the head's frame.
+// Camera points of an image's pixels, near and far, in the head's frame.
 inline void rays_of(const HeadCamera& camera, const std::vector<maq::Point>& pixels, std::vector<Vec3>& from,
                     std::vector<Vec3>& to) {
   const maq::head::RigidMotion back = maq::head::inverse(camera.head_to_camera);

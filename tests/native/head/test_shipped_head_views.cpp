@@ -1,4 +1,4 @@
-// The shipped networks on pictures of a head whose shape, camera and face are known: from every side, with an open
+// The shipped networks on images of a head whose shape, camera and face are known: from every side, with an open
 // mouth and closed eyes; and on many people.
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kSide_px = 320;
 
-// A picture of a head before a plain wall, and where the head is in it.
+// An image of a head before a plain wall, and where the head is in it.
 struct View {
   cv::Mat bgr;
   Box box;

@@ -139,7 +139,7 @@ TEST(FrameFormats, DescriptionsAreCheckedPlaneByPlane) {
   expect_error(MAQ_ERROR_UNSUPPORTED, "Pixel format 0", [&] { maq::checked_image_view(desc); });
 }
 
-// A picture of noise in any format, rows of odd padding.
+// An image of noise in any format, rows of odd padding.
 class Noise {
  public:
   Noise(maq_pixel_format format, int width, int height, int seed) {

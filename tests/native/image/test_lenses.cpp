@@ -1,4 +1,4 @@
-// Lenses with distortion against OpenCV's projection, and pictures without it.
+// Lenses with distortion against OpenCV's projection, and images without it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -120,7 +120,7 @@ TEST(Lenses, ASmallerPictureSeesTheSame) {
   }
 }
 
-// A picture whose colours are the places of its pixels says where each pixel of the undistorted one came from.
+// An image whose colours are the places of its pixels says where each pixel of the undistorted one came from.
 TEST(Lenses, PixelsOfTheUndistortedPictureComeFromTheirPlaces) {
   for (Lens lens : {rational(), fisheye()}) {
     lens = maq::resized(lens, 200, 150);

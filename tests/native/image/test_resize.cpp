@@ -31,7 +31,7 @@ constexpr int kMaxDifference = 0;
 #endif
 
 void expect_as_opencv(int from_width, int from_height, int to_width, int to_height, int channels, uint64_t seed) {
-  // A part of a wider picture, so that rows have padding.
+  // A part of a wider image, so that rows have padding.
   const cv::Mat whole = noise(from_width + int(seed % 4), from_height, channels, seed);
   const cv::Mat from = whole(cv::Rect(0, 0, from_width, from_height));
   const bool shrinks = to_width <= from_width && to_height <= from_height;

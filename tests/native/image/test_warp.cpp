@@ -1,4 +1,4 @@
-// Warped pictures against reading them bilinearly at each pixel.
+// Warped images against reading them bilinearly at each pixel.
 #include "image/geometry/warp.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kFromWidth = 60, kFromHeight = 50, kWidth = 40, kHeight = 70;
 
-// A smooth picture of so many channels.
+// A smooth image of so many channels.
 std::vector<uint8_t> smooth(int channels) {
   std::vector<uint8_t> pixels;
   for (int y = 0; y < kFromHeight; ++y) {

@@ -1,4 +1,4 @@
-// Alpha and depth of a picture against their definitions, pixel by pixel.
+// Alpha and depth of an image against their definitions, pixel by pixel.
 #include "scene/render/coverage.h"
 
 #include <gtest/gtest.h>

@@ -96,7 +96,7 @@ TEST(PointProjection, OfCamerasOfEveryKind) {
       const Cloud cloud = cloud_around(camera, 1, {0, 0, 0}, 3000, ++seed);
       expect_as_reference(cloud, camera, 0.01);
       camera.fy_px *= 1.7;    // pixels that are not square
-      camera.cx_px += width;  // a principal point outside of the picture
+      camera.cx_px += width;  // a principal point outside of the image
       expect_as_reference(cloud, camera, 0.01);
     }
   }

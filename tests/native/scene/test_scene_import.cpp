@@ -467,7 +467,7 @@ TEST_F(SceneImport, PhotosAreTakenAsTheyAreStoredNotRotatedByExif) {
   EXPECT_EQ(picture.image.height_px, 24);
 }
 
-// A picture that encodes the coordinates of each pixel, seen by a distorted camera, tells after loading where each came
+// An image that encodes the coordinates of each pixel, seen by a distorted camera, tells after loading where each came
 // from.
 TEST_F(SceneImport, ViewsAreLoadedUndistorted) {
   MadeCapture made = of_every_model();

@@ -1,4 +1,4 @@
-// Pictures of scenes: against torch, with any number of threads, with work left out and not, and the extreme cases.
+// Images of scenes: against torch, with any number of threads, with work left out and not, and the extreme cases.
 #include "scene/render/scene_renderer.h"
 
 #include <gtest/gtest.h>
@@ -94,7 +94,7 @@ Rendered render(const Scene& scene, const PinholeCamera& camera, const RenderOpt
   return picture;
 }
 
-// Everything that a picture promises whatever the camera is.
+// Everything that an image promises whatever the camera is.
 void expect_sound(const Rendered& picture, const PinholeCamera& camera) {
   ASSERT_EQ(picture.width_px, camera.width_px);
   ASSERT_EQ(picture.height_px, camera.height_px);
@@ -123,7 +123,7 @@ TEST(SceneRenderer, RendersWhatTorchRenders) {
     const double found = psnr(picture.bgr, views[i].bgr);
     std::printf("view %zu: %.1f dB%s\n", i, found, picture.counts.is_rotated ? ", rotated" : "");
     EXPECT_GE(found, 45) << i;
-    // So that the bar constant_terms something: a picture of one colour is far below it.
+    // So that the bar constant_terms something: an image of one colour is far below it.
     double mean = 0;
     for (const uint8_t value : views[i].bgr) mean += value / double(views[i].bgr.size());
     EXPECT_LE(psnr(std::vector<uint8_t>(views[i].bgr.size(), uint8_t(mean)), views[i].bgr), 25) << i;
@@ -299,7 +299,7 @@ TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
   }
 }
 
-// A rolled camera takes the same picture, rotated.
+// A rolled camera takes the same image, rotated.
 TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
   const Scene scene = packed(synthetic_points(20000), maq::CoefficientFormat::kFloat32);
   const PinholeCamera level = camera_of(96, 64, 60);
@@ -309,7 +309,7 @@ TEST(SceneRenderer, ARolledCameraTakesTheRotatedPicture) {
   const Rendered expected = render(scene, level), found = render(scene, portrait);
   EXPECT_TRUE(found.counts.is_rotated);
   EXPECT_FALSE(expected.counts.is_rotated);
-  // At the frame's right and lower edges the rotated one sees more around the picture, and the refiner more of the
+  // At the frame's right and lower edges the rotated one sees more around the image, and the refiner more of the
   // scene.
   size_t same = 0;
   for (size_t y = 0; y < 64; ++y) {

@@ -25,7 +25,7 @@ Scene packed(const FittedPoints& points, maq::PositionFormat positions) {
 // Keys of a scene, its blocks dealt to `workers` in turn, from the last to the first where `is_reversed`.
 std::vector<DepthKey> keys_of(const Scene& scene, const PinholeCamera& camera, double near, int workers = 1,
                               bool is_reversed = false, bool skips = false, uint32_t* drawn = nullptr) {
-  static maq::ZBuffer buffer;  // with what an earlier picture left
+  static maq::ZBuffer buffer;  // with what an earlier image left
   buffer.begin(camera, near, workers);
   const maq::ViewFrustum frustum(camera, near);
   for (uint32_t i = 0; i < scene.block_count; ++i) {
@@ -208,7 +208,7 @@ TEST(ZBuffer, BlocksWhoseBoundsAreNotFiniteAreNotCulled) {
 }
 
 TEST(ZBuffer, PointsThatBleedThroughANearerSurfaceAreRemoved) {
-  // A sparse wall at depth 2 before a dense one at depth 4, in a picture whose sides are no multiples of the blocks'.
+  // A sparse wall at depth 2 before a dense one at depth 4, in an image whose sides are no multiples of the blocks'.
   std::mt19937 random(3);
   std::uniform_real_distribution<float> position(-1, 1);
   std::vector<float> x, y, z;

@@ -1,4 +1,4 @@
-// Pictures of Android's cameras, on an Android in memory: pixels in any layout, upright; times and lenses.
+// Images of Android's cameras, on an Android in memory: pixels in any layout, upright; times and lenses.
 #include "support/android_camera_test.h"
 
 #include <cmath>
@@ -223,7 +223,7 @@ TEST_F(AndroidPictures, IntrinsicsAreThoseOfThePicture) {
   }
 }
 
-// Where a direction is seen in the picture (OpenCV's model of a lens).
+// Where a direction is seen in the image (OpenCV's model of a lens).
 std::pair<double, double> projected(const maq_intrinsics& lens, double x, double y) {
   const double *k = lens.distortion, r2 = x * x + y * y;
   const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));

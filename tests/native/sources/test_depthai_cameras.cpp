@@ -134,7 +134,7 @@ TEST_F(DepthaiCameras, PicturesComeWithDepthTimeAndNumberWithoutACopy) {
 TEST_F(DepthaiCameras, PairsAreMadeByTime) {
   const auto opened = camera();
   const int64_t start = FakeDepthAi::now_ns() - kSecond;
-  // The numbers of the two cameras have nothing to do with each other, and depth comes two pictures late.
+  // The numbers of the two cameras have nothing to do with each other, and depth comes two images late.
   for (int i = 0; i < 12; ++i) {
     fake_.send_colour(fake_.colour(uint8_t(i), i, start + i * kPeriod));
     if (i >= 2) fake_.send_depth(fake_.depth(uint16_t(1000 + i - 2), i + 5, start + (i - 2) * kPeriod + kPeriod / 3));
@@ -190,7 +190,7 @@ TEST_F(DepthaiCameras, DepthThatIsLateIsWaitedForAndThenDoneWithout) {
 }
 
 TEST_F(DepthaiCameras, DepthOfALaterPictureEndsTheWait) {
-  const auto opened = camera({64, 48, 0.2, {}});  // at this rate a picture waits for its depth for 15 seconds
+  const auto opened = camera({64, 48, 0.2, {}});  // at this rate an image waits for its depth for 15 seconds
   const int64_t time = FakeDepthAi::now_ns() - 6 * kSecond;
   fake_.send_colour(fake_.colour(1, 1, time));
   fake_.send_colour(fake_.colour(2, 2, time + 5 * kSecond));

@@ -117,7 +117,7 @@ TEST(Sources, TheEndOfTimeCanBeSoughtAndPlayed) {
   }
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "from 1 to 10000000",
                [] { maq::open_source("stub:pattern?fps=0.01&frames=10000001"); });
-  // Two pictures 31 years apart, as slow as can be: the first is shown.
+  // Two images 31 years apart, as slow as can be: the first is shown.
   const TempFolder folder;
   {
     maq::RecordingWriter writer(folder.file("long.maqrec"), {}, 0);

@@ -1,11 +1,11 @@
-// Pictures of an app, and how a file of one is read again through the C API.
+// Images of an app, and how a file of one is read again through the C API.
 #pragma once
 
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <vector>
 
-// RGB; a picture whose pixels differ from their neighbours, the same at each call.
+// RGB; an image whose pixels differ from their neighbours, the same at each call.
 inline std::vector<uint8_t> speckled(int width, int height, uint32_t seed = 1) {
   std::vector<uint8_t> pixels(size_t(width) * size_t(height) * 3);
   for (uint8_t& value : pixels) {

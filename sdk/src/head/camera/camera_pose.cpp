@@ -356,7 +356,7 @@ CameraPose find_camera_pose(const std::vector<Correspondence>& given, const Came
   std::vector<Hypothesis> found = search.run();
   const size_t agreeing = found.empty() ? 0 : search.inliers_of(found[0].pose).size();
   if (2 * agreeing < points.size()) {
-    // A mirrored picture of the head is the picture of the mirrored head. Part of it may fit in front, too.
+    // A mirrored image of the head is the image of the mirrored head. Part of it may fit in front, too.
     std::vector<PosePoint> mirrored = points;
     for (PosePoint& point : mirrored) point.p.x = -point.p.x;
     PoseSearch other(std::move(mirrored), prior, min_inliers, found.empty() ? kMaxTrials : kMirroredTrials);

@@ -87,7 +87,7 @@ AnchorTerms::AnchorTerms(const HeadPhoto& photo, const AnchorPoints& points, con
 }
 
 std::vector<Correspondence> AnchorTerms::correspondences() const {
-  // The head's scale in the picture, roughly: the ratio of the spreads of pixels and of points across the line of
+  // The head's scale in the image, roughly: the ratio of the spreads of pixels and of points across the line of
   // sight, which are two of three coordinates.
   std::vector<double> xs, ys;
   for (const Cell& cell : cells_) xs.push_back(cell.x_px), ys.push_back(cell.y_px);

@@ -8,7 +8,7 @@
 
 namespace maq::head {
 
-// The camera as edges of triangles need it. Samples are the pixels of a picture that is larger by their number a side.
+// The camera as edges of triangles need it. Samples are the pixels of an image that is larger by their number a side.
 struct RasterSampling {
   RasterSampling(const HeadCamera& camera, int samples_a_side)
       : per_pixel(samples_a_side),
@@ -37,7 +37,7 @@ struct Plane {
   double a = 0, b = 0, c = 0;
 };
 
-// The plane that is 0 along the edge from p to q in the picture (Olano and Greer, Triangle scan conversion using 2D
+// The plane that is 0 along the edge from p to q in the image (Olano and Greer, Triangle scan conversion using 2D
 // homogeneous coordinates, 1997: no clipping). The other way round it is the negative, to the bit: so of triangles that
 // share an edge, each pixel on it belongs to one at least.
 template <class Vertex>
@@ -278,8 +278,8 @@ void MeshRaster::shade_band(const HeadMesh& mesh, const HeadCamera& camera, cons
   const size_t width = size_t(camera.width_px), side = size_t(sampling.per_pixel), samples_count = side * side;
   const bool has_normals = !mesh.normals.empty(), has_template = !mesh.template_points.empty();
   const MeshTexture* const texture = is_textured(mesh, options) ? options.texture : nullptr;
-  // Twice the area of a triangle in the picture and in the texture. Corners behind the near plane are nowhere in the
-  // picture: no level is right for all of such a triangle.
+  // Twice the area of a triangle in the image and in the texture. Corners behind the near plane are nowhere in the
+  // image: no level is right for all of such a triangle.
   const auto level_of = [&](const std::array<const Vertex*, 3>& corners,
                             const std::array<const Attributes*, 3>& attributes) {
     const Vertex &p = *corners[0], &q = *corners[1], &r = *corners[2];

@@ -32,7 +32,7 @@ FillLevel halved(const FillLevel& fine) {
   return coarse;
 }
 
-// Bilinear, at the middle of the fine picture's pixel.
+// Bilinear, at the middle of the fine image's pixel.
 void fill_from(const FillLevel& coarse, FillLevel& fine) {
   const auto taps = [&](int at, int(&index)[2], float(&share)[2]) {
     const float place = (float(at) + 0.5f) / 2 - 0.5f;

@@ -9,7 +9,7 @@ namespace maq {
 namespace {
 
 constexpr int kStep_px = kPatch_px / 2;  // patches overlap by half
-// Standing still explains the picture where moving leaves more than this part of the squared differences; beside it,
+// Standing still explains the image where moving leaves more than this part of the squared differences; beside it,
 // what rounding to whole grey levels leaves.
 constexpr float kMovedFraction = 0.7f, kOwnFraction = 0.85f, kRounding = 0.1f;
 constexpr int kNeighbours = 3;     // patches to each side that are judged together

@@ -24,7 +24,7 @@ struct UnalignedRow {
 #define MAQ_LOAD_ROW(pointer) (reinterpret_cast<const UnalignedRow*>(pointer)->row)
 #define MAQ_ROW_AT(pointer) (reinterpret_cast<UnalignedRow*>(pointer)->row)
 
-// A patch of the first picture, without its mean, and its gradients.
+// A patch of the first image, without its mean, and its gradients.
 struct Template {
   Row brightness[kPatch_px], x[kPatch_px], y[kPatch_px];
   float inverse[3];  // of the covariance of the gradients: xx, xy, yy; 0 without texture
@@ -68,7 +68,7 @@ inline void read_template(const float* at, size_t stride, Template& made) {
   made.inverse[2] = a * factor;
 }
 
-// Where a patch lies in the second picture: a whole pixel and the weights of it and its right and lower neighbours.
+// Where a patch lies in the second image: a whole pixel and the weights of it and its right and lower neighbours.
 struct Position {
   const float* at;
   float right, below;

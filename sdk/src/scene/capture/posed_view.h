@@ -16,7 +16,7 @@ class PosedView {
   // A capture's photo from disk. `long_side_px`: larger ones are made smaller; 0: none. Throws as load_view() does.
   void load(const CaptureView& view, int long_side_px);
 
-  // An app's image of any format, taken with `lens`, whose picture has the size of `image`; `pose` is its camera
+  // An app's image of any format, taken with `lens`, whose image has the size of `image`; `pose` is its camera
   // without distortion. Its memory must stay while this is used. Throws MAQ_ERROR_INVALID_ARGUMENT for another size and
   // for a distortion that is not invertible, and the errors of copy_pixels().
   void load(const ImageView& image, const Lens& lens, const PinholeCamera& pose, int long_side_px);

@@ -22,7 +22,7 @@ std::array<double, 3> up_of_cameras(const std::vector<std::array<double, 9>>& ro
   std::array<Vector3, 3> across{};
   for (const auto& rotation : rotations) {
     for (size_t i = 0; i < 3; ++i) {
-      mean[i] -= rotation[3 + i];  // the second row is where down in the picture is in the world
+      mean[i] -= rotation[3 + i];  // the second row is where down in the image is in the world
       for (size_t j = 0; j < 3; ++j) across[i][j] += rotation[i] * rotation[j];
     }
   }

@@ -36,7 +36,7 @@ void check_render_camera(const PinholeCamera& camera) {
   }
 }
 
-// Whether a corner of the picture moves by as much as interpolation, of 1/32 pixel, can show.
+// Whether a corner of the image moves by as much as interpolation, of 1/32 pixel, can show.
 bool is_visible_rotation(const PixelMap& map, const PinholeCamera& camera) {
   constexpr double kMinMove_px = 1.0 / 64;
   for (const double x : {0.0, double(camera.width_px)}) {

@@ -1,4 +1,4 @@
-// Pictures of a head against a ball whose silhouette, depth and normals are known.
+// Images of a head against a ball whose silhouette, depth and normals are known.
 #include "head/render/head_renderer.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Pictures of meshes against rays.
+// Images of meshes against rays.
 #include <gtest/gtest.h>
 
 #include <algorithm>

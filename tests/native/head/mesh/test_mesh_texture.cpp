@@ -1,4 +1,4 @@
-// Textures of meshes: their levels, and pictures of meshes with them.
+// Textures of meshes: their levels, and images of meshes with them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -72,7 +72,7 @@ TEST(MeshTexture, ALevelIsTheMeanOfFourTexelsOfTheOneBefore) {
   const MeshTexture texture = texture_of(5, 4, [](int row, int column) {
     return Bgr{40 * row, 50 * column, row == column ? 100 : 0};
   });
-  // The middle of the left upper texel of the first level, 2 x 2: the rightmost column of the whole picture is left
+  // The middle of the left upper texel of the first level, 2 x 2: the rightmost column of the whole image is left
   // out.
   const std::array<float, 3> corner = texture.colour(0.25f, 0.25f, 1);
   EXPECT_NEAR(corner[0], 50, 0.51);

@@ -1,4 +1,4 @@
-// The picture of a texture: what photos see well is theirs, all else the network's, and no step lies between.
+// The image of a texture: what photos see well is theirs, all else the network's, and no step lies between.
 #include <gtest/gtest.h>
 
 #include <algorithm>

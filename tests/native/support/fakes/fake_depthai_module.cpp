@@ -1,4 +1,4 @@
-// libmaquette_depthai.so with a device in memory, which sends a hundred pictures with depth a second.
+// libmaquette_depthai.so with a device in memory, which sends a hundred images with depth a second.
 #include <chrono>
 #include <thread>
 

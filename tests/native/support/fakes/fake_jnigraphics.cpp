@@ -1,5 +1,5 @@
 // Android's libjnigraphics.so by OpenCV: the functions of the NDK's imagedecoder.h and bitmap.h that the SDK looks up,
-// with Android's habit of rotating pictures upright by their EXIF orientation. With MAQ_OLDER_ANDROID it has none of
+// with Android's habit of rotating images upright by their EXIF orientation. With MAQ_OLDER_ANDROID it has none of
 // them.
 #include <cstdint>
 #include <cstring>

@@ -40,7 +40,7 @@ class FakeV4l2 : public maq::SystemCalls {
   size_t stride_bytes = 0;       // 0: rows without padding
   uint32_t granted_buffers = 0;  // 0: as many as were asked for
   uint32_t buffer_bytes = 0;     // 0: as many as a frame has
-  uint32_t data_offset[2] = {};  // where pictures begin in each plane of memory
+  uint32_t data_offset[2] = {};  // where images begin in each plane of memory
   uint8_t wrong_planes = 0;      // of memory, added to what TRY_FMT and S_FMT say
   bool endless = false;          // lists that never end
   bool can_export = true;

@@ -1,4 +1,4 @@
-// Which point of a cloud each pixel of a picture shows, by the z-buffer.
+// Which point of a cloud each pixel of an image shows, by the z-buffer.
 #pragma once
 
 #include <limits>
@@ -16,7 +16,7 @@ struct FrontPoints {
   std::vector<float> depths;
 
   FrontPoints(const maq::PointPositions& cloud, const maq::PinholeCamera& camera, double near) {
-    static maq::ZBuffer buffer;  // with what an earlier picture left
+    static maq::ZBuffer buffer;  // with what an earlier image left
     buffer.begin(camera, near, 1);
     maq::PointSpan span;
     for (size_t i = 0; i < 3; ++i) span.base[i] = cloud.origin[i] - camera.centre[i];

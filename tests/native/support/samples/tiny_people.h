@@ -1,4 +1,4 @@
-// Pictures of what the tiny bundle of dense pose takes for people (make_tiny_bundle.py): colours before black.
+// Images of what the tiny bundle of dense pose takes for people (make_tiny_bundle.py): colours before black.
 #pragma once
 
 #include <opencv2/core.hpp>

@@ -1,4 +1,4 @@
-// Brings window, views, panel and saver together: routes what the user does, and draws one frame after the other.
+// Connects window, views, panel and saver: passes the user's actions on, and draws one frame after the other.
 #pragma once
 
 #include <app/frame_times.h>

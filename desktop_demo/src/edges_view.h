@@ -1,5 +1,5 @@
 // Edges of a depth camera, a recording or a depth image, live: depth in colours with curves over it, sizes of boxes,
-// and what the pointer is at.
+// and the target at the pointer.
 #pragma once
 
 #include <app/edges_frame.h>

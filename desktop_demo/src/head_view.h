@@ -1,4 +1,4 @@
-// A head of the person in an image: it forms beside the photo, is turned, laid over the photo, and exported.
+// A head of the person in an image: it forms next to the photo, can be turned, laid over the photo, and exported.
 #pragma once
 
 #include <app/live_head.h>

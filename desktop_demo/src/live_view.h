@@ -21,7 +21,7 @@ class LiveView : public MainView {
       : MainView(options, window, painter), own_(own) {}
 
   void open(const std::string& uri);
-  // Closes the source, and says what another view must open to play the same; "" without one.
+  // Closes the source and returns its URI, so another view can open it; "" without a source.
   std::string hand_over();
   void open_first() { open(own_.start); }
   void open_camera() { open(own_.camera); }

@@ -48,13 +48,13 @@ class MainView {
   virtual Action draw_panel() = 0;
 
   virtual bool is_moving() const { return false; }  // by itself, without another image
-  virtual std::string message() const = 0;          // what the user must know
+  virtual std::string message() const = 0;          // message for the user
   Rect image_rect() const { return image_rect_; }
   virtual double images_per_second() const = 0;
-  // Writes what was found in the image, for a snapshot; null where nothing was.
+  // Writes the results of the image, for a snapshot; null if there are none.
   virtual maquette::Saver::Companions companions() const { return nullptr; }
 
-  // Without a user: once a frame, does what one would; true at the end.
+  // Without a user: replaces the user once a frame; returns true at the end.
   virtual bool act_alone() = 0;
   virtual std::string failure() const = 0;  // a sentence; "" where nothing failed
   virtual void add_to_report(nlohmann::ordered_json* report) const = 0;

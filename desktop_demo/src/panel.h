@@ -1,4 +1,4 @@
-// The panel at the right, with what every view has, and the help.
+// The panel at the right, with the common parts of all views, and the help.
 #pragma once
 
 #include <app/process_load.h>

@@ -46,7 +46,7 @@ class SceneView final : public MainView {
   Compare compare_;
   std::optional<maquette::FlyCamera> camera_;
   bool is_moving_ = false;    // it flies
-  bool needs_image_ = false;  // of what was not the user's steering
+  bool needs_image_ = false;  // of movements other than the user's steering
   bool drags_slider_ = false;
   float slider_ = 0.5f;
   int photo_ = 0;  // where the camera was last or flies to

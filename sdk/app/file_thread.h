@@ -14,7 +14,7 @@ namespace maquette {
 
 class FileThread {
  public:
-  using Job = std::function<std::string()>;  // returns what it did, for the user; "": nothing to say
+  using Job = std::function<std::string()>;  // returns a message for the user; "": none
 
   FileThread() : thread_([this] { run(); }) {}
   ~FileThread() {  // after all that was added
@@ -27,7 +27,7 @@ class FileThread {
     jobs_.push_back(std::move(job));
     wake_.notify_one();
   }
-  // Many jobs wait: leave out what can be left out.
+  // Many jobs wait: leave out optional jobs.
   bool is_busy() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return jobs_.size() >= 30;

@@ -19,13 +19,13 @@ class FlyCamera {
   // To the right about the world's up, and upwards, in radians; stops short of straight up and down. A camera that is
   // rolled becomes level gradually.
   void rotate(double yaw, double pitch);
-  void zoom(double factor);  // above 1 things get larger; the longer side keeps within 20 to 110 degrees
+  void zoom(double factor);  // above 1 the scene gets larger; the longer side keeps within 20 to 110 degrees
   // Flies there while update() is called, until the user steers; is there at once for 0 seconds.
   void fly_to(const maq_pinhole_camera& camera, double seconds, int photo_index);
   bool update(double seconds);                                   // true when it moved
   maq_pinhole_camera camera(int width_px, int height_px) const;  // shows all that the photo it was at last would
-  // The photo's camera that it started at or flew to, until it leaves: of the photo's own size, to be compared with it
-  // pixel by pixel.
+  // The photo's camera at which it started or to which it flew, until it leaves. It has the photo's size, for a
+  // comparison pixel by pixel.
   const std::optional<maq_pinhole_camera>& photo_camera() const { return at_; }
   int photo_index() const { return at_ ? photo_index_ : -1; }
   int nearest_photo(

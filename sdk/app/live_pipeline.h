@@ -1,6 +1,6 @@
-// A pipeline (maquette/pipeline.h) for programs with a window: options that suit one, another source where one cannot
-// be opened, and what the user is told. Used as LiveDensePose or LiveEdges, which say what runs. LivePlayer is what it
-// has in common with LivePrediction.
+// A pipeline (maquette/pipeline.h) for programs with a window: suitable options, another source if one cannot be
+// opened, and messages for the user. Used as LiveDensePose or LiveEdges, which set the model. LivePlayer is the common
+// interface with LivePrediction.
 #pragma once
 
 #include <atomic>
@@ -13,14 +13,14 @@
 
 namespace maquette {
 
-// A file's path as a URI (maquette/source.h); what is one already, as it is.
+// A file's path as a URI (maquette/source.h); a URI stays as it is.
 std::string source_uri(const std::string& path_or_uri);
 
 struct LiveStatus {
   maq_pipeline_state state = MAQ_PIPELINE_STOPPED;
   std::string uri;         // what plays
   std::string activity;    // "Opening v4l2:/dev/video0"; "" when results come or nothing is to be done
-  std::string problem;     // why no results come, or what could not be done; a sentence
+  std::string problem;     // a sentence: the reason why no results come, or the failed action
   bool has_ended = false;  // no more results: a photo, the end of a clip, max_results, or has_failed
   bool has_failed = false;
   uint64_t dropped_frames = 0;
@@ -36,12 +36,12 @@ struct LiveOptions {
   double frame_budget_ms = 0;       // of dense pose (maq_densepose_model_set_frame_budget)
 };
 
-// These return at once, unless they say otherwise; what goes wrong is in status().
+// These return at once, unless they say otherwise; errors are in status().
 class LivePlayer {
  public:
   virtual ~LivePlayer() = default;
 
-  // Plays a source in place of the present one. `fallback`: what plays when it cannot be opened; the reason stays in
+  // Plays a source in place of the present one. `fallback`: source to play if it cannot be opened; the reason stays in
   // `problem`.
   virtual void open(const std::string& uri, const std::string& fallback) = 0;
   virtual void close() = 0;  // so that others can open the source

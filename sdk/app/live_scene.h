@@ -23,7 +23,7 @@
 namespace maquette {
 
 struct LiveSceneImage {
-  // Photo and error (mean of the channels) are empty unless the camera is that of a photo.
+  // Photo and error (mean of the channels) are empty unless the camera is a photo's.
   RgbaImage rendering, photo, error;
   double psnr_db = 0;  // NaN where the photo is empty, infinite where nothing differs
   int photo_index = -1;
@@ -34,9 +34,10 @@ struct LiveSceneImage {
 
 struct LiveSceneState {
   enum Phase { kClosed, kOpening, kReady, kFailed } phase = kClosed;
-  double progress = 0;     // 0 to 1, while opening
-  std::string path, text;  // text: what is being done, what is missing or why it failed, in sentences; or nothing
-  maq_scene_info info{};   // from here on: once it is ready
+  double progress = 0;  // 0 to 1, while opening
+  std::string path,
+      text;               // text: sentences: the current step, the missing parts or the reason of a failure; or nothing
+  maq_scene_info info{};  // from here on: once it is ready
   std::vector<maq_pinhole_camera> photos;
   std::vector<std::string> photo_names;  // with " (held out)" where the capture keeps them for comparisons
 };
@@ -48,8 +49,8 @@ class LiveScene {  // all calls by the thread that takes the images
   LiveScene(const Context& context, const std::string& bundle_path, int threads = 0,
             std::function<void()> on_change = nullptr);
   ~LiveScene();  // waits for the step that runs
-  // In place of what was open, of which no image comes any more: a scene file, with the photos of `capture_folder`
-  // unless that is empty; or a capture, which is built.
+  // Opens, instead of the current scene, whose images end: a scene file, with the photos of `capture_folder` unless
+  // that is empty; or a capture, which is built.
   void open(const std::string& path, const std::string& capture_folder = {});
   void close() { open({}); }
   // Renders an image once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or

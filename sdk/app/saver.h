@@ -1,4 +1,4 @@
-// Saves snapshots and clips of what is shown into a folder, without holding up the thread that draws.
+// Saves snapshots and clips of the window to a folder, without delaying the thread that draws.
 //
 //   maquette::Saver saver(context, "/home/me/Pictures");
 //   saver.begin_clip(25);
@@ -19,7 +19,7 @@ namespace maquette {
 
 class Saver {  // all calls by one thread
  public:
-  // The context must outlive this, whose destructor completes what was begun.
+  // The context must outlive this. The destructor completes all jobs.
   Saver(const Context& context, const std::string& folder) : context_(context), folder_(folder) {}
   ~Saver() { end_clip(); }
   Saver(const Saver&) = delete;
@@ -40,7 +40,7 @@ class Saver {  // all calls by one thread
   // A clip has one size, so it ends when an image has another.
   void add_to_clip(RgbaImage image);
 
-  // In the folder, named by the time and a count; for what others write.
+  // Returns a path in the folder, named by the time and a count, for files that others write.
   std::string new_path(const char* extension);
   // Another job for the thread that writes, in its turn.
   void run(FileThread::Job job) { files_.add(std::move(job)); }

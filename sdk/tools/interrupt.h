@@ -1,4 +1,4 @@
-// Ctrl-C as a request to finish what is at hand.
+// Ctrl-C as a request to finish the current work.
 #pragma once
 
 #include <maquette/maquette.hpp>

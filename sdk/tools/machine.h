@@ -1,12 +1,12 @@
-// The machine a measurement was made on, and what it was doing meanwhile (Linux: /proc).
+// The machine of a measurement, and its load meanwhile (Linux: /proc).
 #pragma once
 
 #include <cstdint>
 #include <maquette/maquette.hpp>
 #include <nlohmann/json.hpp>
 
-// Processor, cores, instruction sets that matter to networks, memory, system, frequency governor and load. What the
-// system does not say is null.
+// Processor, cores, instruction sets that matter to networks, memory, system, frequency governor and load. Values that
+// the system does not report are null.
 nlohmann::ordered_json describe_machine();
 
 // Version, commit and options of the SDK, and the version of ONNX Runtime.

@@ -11,9 +11,9 @@ class App;
 // A context whose warnings go to standard error.
 maquette::Context open_context();
 
-// Parses the arguments, which runs what they ask for, and returns the exit status: *exit_code, 1 after an exception,
-// which is printed, and where standard output is lost, 2 for wrong usage.
+// Parses the arguments, runs the command, and returns the exit status: *exit_code, 1 after an exception, which is
+// printed, and where standard output is lost, 2 for wrong usage.
 int run_program(CLI::App& app, int argc, char** argv, const int* exit_code);
 
-// Prints what an exception says, and returns the exit status for it.
+// Prints the text of an exception, and returns its exit status.
 int report(const std::exception& error);

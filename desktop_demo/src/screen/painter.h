@@ -24,7 +24,7 @@ class Painter {
   // `slider`: the fraction of the width that shows the photo; kSample: the sample.
   static constexpr float kSample = 2;
   void draw_scene(const Rect& rect, float slider);
-  // The body from a direction, in radians, with what was seen of it in colour.
+  // Draws the body from a direction, in radians, with seen parts in colour.
   void draw_body(const Rect& rect, float yaw, float pitch);
 
  private:

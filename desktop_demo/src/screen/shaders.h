@@ -103,7 +103,7 @@ void main() {
   } else if (view == 3) {
     seen = mix(seen, part_colours[1 + (int(here.w) * 7) % 24], 0.55 * inside);
   } else {
-    // Folds and shadows of what is worn show through.
+    // Folds and shadows of the clothes show through.
     float light = 0.65 + 0.6 * dot(texture(camera, at).rgb, vec3(0.299, 0.587, 0.114));
     seen = mix(seen, worn(here) * light, inside);
   }

@@ -35,7 +35,7 @@ class Window {
   static void wake();
   void begin_drawing();
   void end_drawing();
-  void show();  // what was drawn, on the screen
+  void show();  // shows the drawn frame
   maquette::RgbaImage read_pixels(const Rect& rect) const;
   void toggle_full_screen();
 

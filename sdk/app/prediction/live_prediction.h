@@ -35,7 +35,7 @@ struct PredictionChoice {
 
 struct NoveltyMoment {
   maq_novelty_score score{};
-  double time_s = 0;  // timestamp of its frame, after that of the first
+  double time_s = 0;  // timestamp of its frame, relative to the first frame
 };
 
 struct PredictionFrame {

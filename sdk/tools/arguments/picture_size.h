@@ -7,5 +7,5 @@ struct PictureSize {
   int width_px = 0, height_px = 0;
 };
 
-// Throws std::runtime_error for what is no size, with the name of its option.
+// Throws std::runtime_error for an invalid size, with the name of its option.
 PictureSize parse_picture_size(const std::string& text, const std::string& option = "--size");

@@ -1,4 +1,4 @@
-// Times of a case of `maquette bench`: those of its stages, run by run, and why they may be unreliable.
+// Times of a case of `maquette bench`: the times of its stages, run by run, and the reasons why they may be unreliable.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ class StageTimes {
   // `stages` in their order; the last one is all of a run.
   explicit StageTimes(std::vector<const char*> stages) : stages_(std::move(stages)), ms_(stages_.size()) {}
 
-  // A run: a time for each stage, and what all threads worked meanwhile.
+  // Adds a run: a time for each stage, and the CPU time of all threads.
   void add(const std::vector<double>& ms, double processor_s);
 
   const std::vector<const char*>& stages() const { return stages_; }
@@ -25,7 +25,7 @@ class StageTimes {
   double runs_per_second() const;
   double processor_ms() const;  // of a run
 
-  // Why the times are unreliable, where so many runs and seconds were asked for; empty if they are not.
+  // Reasons why the times are unreliable, for the requested numbers of runs and seconds; empty if they are reliable.
   std::vector<std::string> warnings(int min_runs, double min_seconds) const;
   nlohmann::ordered_json ms_json() const;  // p50, p90 and p99 of each stage
   double cores_busy() const;

@@ -1,5 +1,5 @@
-// The commands of `maquette`. Each adds itself to the app; its exit code, if not 0, goes to `*exit_code`, and what it
-// throws is printed as its error.
+// The commands of `maquette`. Each adds itself to the app; its exit code, if not 0, goes to `*exit_code`, and its
+// exception is printed as its error.
 #pragma once
 
 namespace CLI {

@@ -11,5 +11,5 @@ std::vector<maq_pinhole_camera> flight_through(const std::vector<maq_pinhole_cam
 // `frames` cameras on a circle around the scene's box, a little above it, that look at its middle; 60 degrees wide.
 std::vector<maq_pinhole_camera> flight_around(const maq_scene_info& scene, int width_px, int height_px, int frames);
 
-// The same camera with another image size, which shows at least what it saw before.
+// The same camera with another image size; it shows at least the previous view.
 maq_pinhole_camera with_size(const maq_pinhole_camera& camera, int width_px, int height_px);

@@ -21,17 +21,17 @@ struct FrameLimits {
 // --max-frames and --every.
 void add_frame_limits(CLI::App& command, FrameLimits& limits);
 
-// Throws std::runtime_error for two of which files would have one name.
+// Throws std::runtime_error if files of two sources would have the same name.
 std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts);
 
-// Opens each source and calls `run` with it, until Ctrl-C; before the first, `load`, whose errors are the command's.
-// What cannot be opened, and what `run` throws, is printed and does not cost the rest of a batch, but for OutputLost.
-// Returns the exit code.
+// Opens each source and calls `run` with it, until Ctrl-C; before the first, `load`, whose errors are the command's. A
+// source that cannot be opened, and an exception of `run`, are printed. The rest of a batch goes on, except after
+// OutputLost. Returns the exit code.
 int run_sources(const maquette::Context& context, const std::vector<SourceArgument>& arguments,
                 const std::function<void()>& load,
                 const std::function<void(const SourceArgument&, maquette::Source&)>& run);
 
-// A frame, and what the names of its files begin with: of clips with its number.
+// A frame, and the beginning of its file names: in clips with its number.
 struct SourceFrame {
   const maquette::Frame& frame;
   std::string stem;
@@ -40,7 +40,7 @@ struct SourceFrame {
 // Whether the source has more than one picture.
 bool is_clip(const maquette::Source& source);
 
-// Calls `work` with each frame within the limits, until Ctrl-C; it returns what the progress bar says of it. The bar is
+// Calls `work` with each frame within the limits, until Ctrl-C; it returns the text for the progress bar. The bar is
 // there for clips, unless `quiet`. Returns how many there were.
 int64_t run_frames(const SourceArgument& argument, maquette::Source& source, const FrameLimits& limits, bool quiet,
                    const std::function<std::string(const SourceFrame&)>& work);

@@ -1,4 +1,4 @@
-// Drawn images as a clip, of the kind that this build can write.
+// Writes drawn images as a clip, of a kind that this build supports.
 #pragma once
 
 #include <filesystem>

@@ -14,7 +14,7 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void advance(int64_t done, const std::string& note);
-  // Ends the line of the bar; what is printed afterwards starts on its own.
+  // Ends the line of the bar: later output starts on a new line.
   void finish();
 
  private:

@@ -11,8 +11,8 @@ bool terminal_shows_pictures();
 
 class TerminalPicture {
  public:
-  // The image with a line of text below, over the one before; at most ten a second, more are left out. What is
-  // printed afterwards starts on its own line.
+  // The image with a line of text below, over the one before; at most ten a second, more are left out. Later output
+  // starts on a new line.
   void show(const maquette::Frame& frame, const std::string& line);
 
  private:

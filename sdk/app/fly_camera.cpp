@@ -57,7 +57,7 @@ FlyCamera::FlyCamera(const maq_scene_info& scene, const std::vector<maq_pinhole_
   // A box without a size, or with one that is lost in 16 digits so far out, gets one in which one can move.
   const double diagonal = length(mix(1, vec3(scene.bounds_max), -1, vec3(scene.bounds_min))), far_out = length(middle);
   size_ = diagonal > 1e-10 * far_out && std::isfinite(diagonal) ? diagonal : std::max(1.0, 1e-6 * far_out);
-  // From a little above, 60 degrees wide: the ball about the box fills the picture.
+  // From a little above, 60 degrees wide: the ball about the box fills the image.
   const Vec3 right = unit(cross(up_, std::abs(up_[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
   const Vec3 ahead = unit(mix(2, cross(up_, right), -1, up_));
   pose_ = {rotation_of(right, ahead), mix(1, middle, -size_, ahead), {640, 480, 415, 415, 0, 0}};

@@ -9,7 +9,7 @@
 
 class EdgesDrawing {
  public:
-  // Onto `rect`, which shows the frame's picture. `scale`: of texts and lines. The frame must outlive this.
+  // Onto `rect`, which shows the frame's image. `scale`: of texts and lines. The frame must outlive this.
   EdgesDrawing(const maquette::EdgesFrame& frame, const Rect& rect, float scale);
   ~EdgesDrawing();
   EdgesDrawing(const EdgesDrawing&) = delete;

@@ -18,8 +18,8 @@ maq_status keep_error(const Handle* handle, maq_status status, const char* funct
     latest_error = function == nullptr ? text : concatenate(function, ": ", text);
     if (handle != nullptr && handle->handle_state().is_held()) handle->set_error(latest_error);
   } catch (...) {
-    // No memory for the text: the status still says what happened, as the text before it would not. So short a text
-    // lies in the string itself.
+    // No memory for the text: the status still tells the error; an older text would not. So short a text lies in the
+    // string itself.
     latest_error = kShortNoMemory;
     if (handle != nullptr && handle->handle_state().is_held()) handle->set_error(kShortNoMemory);
   }

@@ -17,7 +17,7 @@ Bundle read_installed_bundle(const std::string& config, const std::string& name)
               " does not exist; install the models with the library, or set bundle_path or bundle_files.");
 }
 
-// Names and addresses of what the caller gave.
+// Names and addresses of the caller's files.
 std::vector<NamedBuffer> buffers_of(const char* config, const char* path, const maq_memory_file* files,
                                     uint32_t file_count) {
   if (path != nullptr && file_count > 0) {

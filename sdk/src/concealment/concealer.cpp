@@ -129,7 +129,7 @@ struct Concealer::State {
     prepare();
   }
 
-  // The rate of what comes is the median of the latest steps: some frames are lost, and stalls are long.
+  // The frame interval is the median of the latest steps: some frames are lost, and stalls are long.
   void note_step(int64_t time_ns) {
     const int64_t step_ns = time_ns - std::exchange(captured_ns, time_ns);
     if (step_count++ == 0) return;  // the first frame

@@ -14,7 +14,7 @@
 namespace maq {
 namespace {
 
-// With those that it needs: OpenCV's codecs on Debian 12 take 270 MiB of address space.
+// With its dependencies: OpenCV's codecs on Debian 12 take 270 MiB of address space.
 constexpr size_t kLargestLibraryBytes = size_t(512) << 20;
 
 }  // namespace
@@ -51,7 +51,7 @@ LibraryOpening open_library(const std::string& path) {
     const bool is_told = says_out_of_memory(opening.error) && !is_static_storage;
     if (is_told) throw std::bad_alloc();
     require_memory(kThreadLocalBytes);
-    // For what glibc does not say, memory may have been short for a moment.
+    // If glibc gives no reason, memory may have been short for a moment.
     if (again || access(path.c_str(), R_OK) != 0) return opening;
   }
 }

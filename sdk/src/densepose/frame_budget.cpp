@@ -6,9 +6,9 @@ namespace maq {
 namespace {
 
 constexpr int kKeyFrameIntervals[] = {2, 4};
-constexpr int kSideStepPx = 32;  // what networks pad their input to
-// Fractions of the budget: above the first, less is done; below the second, by what is expected, more. Between them
-// lies what key frames take more than others, and noise.
+constexpr int kSideStepPx = 32;  // multiple to which networks pad their input
+// Fractions of the budget: above the first, less work is done; if the expected time is below the second, more. The
+// extra time of key frames and noise lie between them.
 constexpr double kFull = 0.9, kHasTime = 0.8;
 // How long there must be time before more is done. Twice as long after each time that this had to be taken back: a
 // phone that is warm throttles again at once.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMaxJsonBytes = 256 << 10;
 
-// Coordinates to a hundredth of a pixel and scores to four digits: what is there, without the noise of float to text.
+// Coordinates have a hundredth of a pixel and scores four digits, without the noise of converting floats to text.
 double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 
 std::string json_of(const DensePoseResult& result) {

@@ -12,7 +12,7 @@ namespace {
 constexpr int kTile_px = 16;  // areas are 2 x 2 tiles and overlap by one
 constexpr double kMinKnown = 0.9;
 // A crease of 18 degrees departs from its best plane by 0.25 r or more (root mean square) in one of the areas that it
-// crosses; by chance, white noise hardly departs by more than a fifth from what its second differences say.
+// crosses; by chance, white noise departs by at most about a fifth from the estimate by its second differences.
 constexpr double kFloor_r = 0.1, kNoiseFactor = 1.2;
 // From the mean absolute second difference to the standard deviation, of white Gaussian noise.
 constexpr double kDeviationOfBends = 0.51166;  // sqrt(pi / 2) / sqrt(6)

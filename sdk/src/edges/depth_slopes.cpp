@@ -16,8 +16,8 @@ constexpr size_t kDepthRows = 3, kMirroredRows = 2, kPlaneRows = 6;
 inline float is_known(float depth) { return depth > 0 ? 1.0f : 0.0f; }
 
 // g / (1 + |g|) of g = f (z - z') / z', z' the depth of the neighbour, with one division. The difference of two close
-// depths is exact, which that of their inverses is not. Limited, so that no product overflows. A factor instead of a
-// branch, which would keep compilers from making vectors.
+// depths is exact; the difference of their inverses is not. Limited, so that no product overflows. A factor instead of
+// a branch, which would keep compilers from making vectors.
 inline float squashed_slope(float here, float there, float focal_px) {
   constexpr float kLimit = 1e30f;
   const float both_known = is_known(here) * is_known(there);

@@ -76,8 +76,8 @@ int threads_of(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, const B
                          settings);
 }
 
-// Planned memory is a second block beside what the first run took; without it a stream takes an eighth less, in the
-// same time.
+// Planned memory is a second block in addition to the first run's memory. Without it a stream takes an eighth less
+// memory, in the same time.
 SessionSettings of_stream(SessionSettings settings, int threads) {
   settings.threads = threads;
   settings.plans_memory = false;

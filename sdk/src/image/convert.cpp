@@ -98,7 +98,7 @@ void nv12_to_bgr(const ImageView& image, uint8_t* bgr) {
 // --- packed formats, row by row
 // ---------------------------------------------------------------------------------------
 
-// RGB to BGR and back. Five pixels are a vector of which the last byte is written over by the next.
+// RGB to BGR and back. Five pixels are a vector; the next vector overwrites its last byte.
 MAQ_SIMD_CLONES void swap_red_and_blue(const uint8_t* from, int width, uint8_t* to) {
   using Bytes __attribute__((vector_size(16))) = uint8_t;
   int i = 0;
@@ -160,7 +160,7 @@ void convert_rows(const ImageView& image, ConvertRow convert, uint8_t* to, size_
   }
 }
 
-// From a format other than BGR8; null for those that are no rows of pixels in colour.
+// From a format other than BGR8; null for formats without rows of colour pixels.
 ConvertRow row_to_bgr(maq_pixel_format format) {
   switch (format) {
     case MAQ_PIXEL_RGB8: return swap_red_and_blue;

@@ -9,7 +9,7 @@ namespace maq {
 namespace {
 
 constexpr double kMinScaleOfBilinear = 0.8;  // below it pixels are averaged first
-constexpr int kMarginPx = 2;                 // around what the crop shows, for the bilinear reading
+constexpr int kMarginPx = 2;                 // around the crop's part, for bilinear interpolation
 
 // The pixels [x0, x1) x [y0, y1) of the image that the crop reads; empty where it lies beyond the image.
 struct Window {
@@ -37,7 +37,7 @@ MAQ_SIMD_CLONES void read_line(const float* planes, int width, int height, const
                                int count, float* line, size_t line_plane) {
   const size_t plane = size_t(width) * size_t(height);
   for (int i = 0; i < count; ++i) {
-    // Clamped so that what lies far outside has no weight and fits an int.
+    // Clamped: positions far outside have no weight and fit an int.
     const float x = float(std::clamp(at.x + i * step.x, -1.0, double(width)));
     const float y = float(std::clamp(at.y + i * step.y, -1.0, double(height)));
     const int left = int(x + 1.0f) - 1, top = int(y + 1.0f) - 1;

@@ -14,8 +14,7 @@ ManifestNode ManifestNode::parse(const std::string& text, const std::string& ori
     root = json::parse(text);
   } catch (const json::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 3, column 9: …"; also for numbers that a double cannot
-    // hold.
-    // The text quotes what was read, however long that is.
+    // hold. The text quotes the value, however long it is.
     constexpr size_t kMaxBytes = 200;
     std::string what = error.what();
     what = what.substr(what.find(']') + 2);

@@ -12,7 +12,7 @@
 namespace maq {
 namespace {
 
-// The oldest interface that has what the SDK calls and that it was tested with; later releases keep it.
+// The oldest interface with all functions that the SDK calls, and tested with it; later releases keep it.
 constexpr uint32_t kApiVersion = 20;
 // Functions that are called if the library has them (provider.cpp).
 constexpr uint32_t kNewerApiVersion = 24;
@@ -21,7 +21,7 @@ constexpr char kFileName[] = "libonnxruntime.so.1";
 constexpr char kRemedy[] =
     " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
 
-// Either the one file that was named, which must open, or the first of the usual places that does.
+// The named file, which must open, or otherwise the first of the usual files that opens.
 void* find_library(const std::string& explicit_path, std::string* opened_path) {
   const char* from_environment = std::getenv("MAQ_ONNXRUNTIME_LIB");
   std::string named = explicit_path;

@@ -124,8 +124,8 @@ void Session::open(const std::vector<uint8_t>& bytes, const SessionSettings& set
   const std::unique_ptr<OrtSessionOptions, decltype(api.ReleaseSessionOptions)> options(made,
                                                                                         api.ReleaseSessionOptions);
   check(api.SetUserLoggingFunction(options.get(), forward_to_log, const_cast<Log*>(&runtime_->log())));
-  // XNNPACK brings threads of its own, beside which ONNX Runtime wants those of the session to be one that does not
-  // spin: https://onnxruntime.ai/docs/execution-providers/Xnnpack-ExecutionProvider.html
+  // XNNPACK has its own threads. ONNX Runtime then recommends one thread for the session, which does not spin:
+  // https://onnxruntime.ai/docs/execution-providers/Xnnpack-ExecutionProvider.html
   const bool has_own_threads = provider_ == MAQ_PROVIDER_XNNPACK;
   threads_.emplace(has_own_threads ? 0 : settings.threads - 1);  // the first is the caller of run()
   const int thread_count = threads_->count() + 1;

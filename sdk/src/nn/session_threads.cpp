@@ -46,7 +46,7 @@ void SessionThreads::Worker::end() {
   thread.join();
 }
 
-SessionThreads::SessionThreads(int count) : SessionThreads() {  // so that what is thrown here ends those started
+SessionThreads::SessionThreads(int count) : SessionThreads() {  // so an exception here ends the started threads
   if (count > 0 && address_space_left() < kMinAddressSpace) {
     shortage_ = concatenate("The process may take less than ", kMinAddressSpace >> 20,
                             " MiB more (ulimit -v), and ONNX Runtime hangs where memory ends on several threads.");

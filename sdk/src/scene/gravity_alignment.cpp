@@ -29,7 +29,7 @@ PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<doub
 }
 
 PixelMap pixel_map_between(const PinholeCamera& source, const PinholeCamera& target) {
-  // The rotation: target.rotation * source.rotation^T, of which only the part across the axis is not trivial.
+  // The rotation: target.rotation * source.rotation^T, only the part across the axis is not trivial.
   double rotation[2][2] = {};
   for (size_t i = 0; i < 2; ++i) {
     for (size_t j = 0; j < 2; ++j) {

@@ -9,7 +9,7 @@
 
 namespace maq {
 
-// The camera rotated about its optical axis so that `up` of the world points up in the picture. As it is where the
+// The camera rotated about its optical axis so that `up` of the world points up in the image. As it is where the
 // world's up is along the optical axis, and continuous near that.
 PinholeCamera gravity_aligned(const PinholeCamera& camera, const std::array<double, 3>& up);
 

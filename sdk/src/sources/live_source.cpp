@@ -149,7 +149,7 @@ struct LiveSource::State {
     return true;
   }
 
-  // Sets what was set before the camera was lost.
+  // Sets the controls that were set before the camera was lost.
   void restore_controls(Camera& camera) {
     std::vector<ControlSetting> before;
     {
@@ -173,7 +173,7 @@ struct LiveSource::State {
   // With the mutex locked: whether next() has something to say.
   bool is_ready() const { return count > 0 || failure || at_end || stopping; }
 
-  // With the mutex locked, after each change of what is_ready() says.
+  // With the mutex locked, after each change of is_ready().
   void show_news() {
     if (!news || is_signalled == is_ready()) return;
     is_signalled = !is_signalled;

@@ -27,7 +27,7 @@ std::unique_ptr<Source> without_log(SourceUri uri, const Log&) {
   return open(std::move(uri));
 }
 
-// A kind of source: opens one itself, or makes what opens its cameras.
+// A kind of source: opens a source itself, or makes the opener of its cameras.
 struct Entry {
   SourceScheme scheme;
   std::unique_ptr<Source> (*open)(SourceUri uri, const Log& log);

@@ -37,7 +37,7 @@ struct SourceFrame {
   std::string stem;
 };
 
-// Whether the source has more than one picture.
+// Whether the source has more than one image.
 bool is_clip(const maquette::Source& source);
 
 // Calls `work` with each frame within the limits, until Ctrl-C; it returns the text for the progress bar. The bar is

@@ -22,7 +22,7 @@ cv::Mat plane_of(const maquette::EdgesResult& result, int type, const void* valu
 
 cv::Scalar bgr(const maquette::Rgb& colour) { return {double(colour.b), double(colour.g), double(colour.r)}; }
 
-// Draws what is in space onto the enlarged picture.
+// Draws what is in space onto the enlarged image.
 class Drawing {
  public:
   Drawing(cv::Mat& canvas, const maq_intrinsics& camera, int scale) : canvas_(canvas), camera_(camera), scale_(scale) {}

@@ -163,7 +163,7 @@ cv::Mat draw_overlay(const cv::Mat& image, const maquette::DensePoseResult& resu
   const int scale = std::clamp(kReadableSidePx / std::max(image.cols, image.rows), 1, kLargestEnlargement);
   cv::Mat canvas;
   cv::resize(image, canvas, image.size() * scale, 0, 0, scale == 1 ? cv::INTER_NEAREST : cv::INTER_CUBIC);
-  // The people stand out from a slightly darkened picture.
+  // The people stand out from a slightly darkened image.
   const std::vector<maq_densepose_person> people = result.people();
   if (!people.empty()) canvas.convertTo(canvas, -1, 0.82, 0);
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-// Whether standard output is a terminal that can show pictures.
+// Whether standard output is a terminal that can show images.
 bool terminal_shows_pictures();
 
 class TerminalPicture {

@@ -65,7 +65,7 @@ const std::string& small_room() {
   return path;
 }
 
-// From inside of the room, a small picture.
+// From inside of the room, a small image.
 maq_pinhole_camera small_camera(const maquette::LiveScene& scene) {
   maquette::FlyCamera fly(scene.state()->info, {});
   fly.move(0, 0, 1, 1, 0.7);

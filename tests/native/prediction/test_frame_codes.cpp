@@ -1,4 +1,4 @@
-// Frames as codes: what torch says, and extreme pictures.
+// Frames as codes: what torch says, and extreme images.
 #include <gtest/gtest.h>
 
 #include <cmath>

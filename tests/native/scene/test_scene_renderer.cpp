@@ -285,7 +285,7 @@ TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
 }
 
 TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
-  // A wall across the axis, 2 away, wider than the picture.
+  // A wall across the axis, 2 away, wider than the image.
   maq::FittedPoints points = synthetic_points(20000);
   for (float& z : points.z) z = 2;
   const Scene scene = packed(points, maq::CoefficientFormat::kInt8);

@@ -50,7 +50,7 @@ head::TextureOptions texture_options(const maq_head_builder_config& config) {
   return options;
 }
 
-// The stage of a fit of which the fraction `done` is finished.
+// The stage of a fit when the fraction `done` is finished.
 const char* stage_of_fit(double done) {
   if (done <= 0) return "Finding cameras and a first shape.";
   return done < 1 ? "Fitting shape and colours to the pixels." : "The head is fitted.";

@@ -12,7 +12,7 @@ struct TraceFunctions {
   void (*end_section)() = nullptr;
 };
 
-// Elsewhere than on Android only a library that is open already: that of a test.
+// On other systems only a library that is open already: a test's library.
 #ifdef __ANDROID__
 constexpr int kMode = RTLD_NOW;
 #else

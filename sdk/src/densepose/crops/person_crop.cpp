@@ -21,7 +21,7 @@ Point unit(const Point& vector) {
   return {vector.x / length, vector.y / length};
 }
 
-// The mean of places, and the sums that the slope of a value over them needs.
+// The mean of positions, and the sums for the slope of a value over them.
 class SlopeFit {
  public:
   void add(const Point& at, double value) {
@@ -34,7 +34,7 @@ class SlopeFit {
   int count() const { return count_; }
   Point mean() const { return {x_ / count_, y_ / count_}; }
 
-  // Least squares; (0, 0) where all places lie on one line.
+  // Least squares; (0, 0) if all positions lie on one line.
   Point slope() const {
     const double xx = xx_ - x_ * x_ / count_, xy = xy_ - x_ * y_ / count_, yy = yy_ - y_ * y_ / count_;
     const double xv = x_value_ - x_ * value_ / count_, yv = y_value_ - y_ * value_ / count_;
@@ -110,7 +110,7 @@ std::optional<Point> find_body_axis(const DenseLogits& logits, const AffineMap& 
         head.add(at, 0);
       } else {
         const double u = double(logits.charts->at(part, row, column).u);
-        torso.add(at, u >= 0 ? std::min(u, 1.0) : 0);  // 0 for what is no number too
+        torso.add(at, u >= 0 ? std::min(u, 1.0) : 0);  // 0 also for NaN
       }
     }
   }

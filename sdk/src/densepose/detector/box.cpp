@@ -46,7 +46,7 @@ bool comes_before(const ScoredBox& a, const ScoredBox& b) {
 
 void non_maximum_suppression(std::vector<ScoredBox>& boxes, float iou, size_t limit) {
   std::sort(boxes.begin(), boxes.end(), comes_before);
-  auto end = boxes.begin();  // of those that are kept, which move to the front
+  auto end = boxes.begin();  // of the kept boxes, which move to the front
   for (const ScoredBox& candidate : boxes) {
     if (size_t(end - boxes.begin()) == limit) break;
     const bool suppressed = std::any_of(

@@ -12,8 +12,8 @@ namespace maq {
 namespace {
 
 constexpr int kMaxClasses = 64;
-// Sentinel below every logit of a network: stands for a missing class. Finite, so that interpolating it gives no NaN;
-// logits are clamped to [kSentinelLogit, -kSentinelLogit].
+// Sentinel below every logit of a network: a missing class. Finite, so that interpolating it gives no NaN; logits are
+// clamped to [kSentinelLogit, -kSentinelLogit].
 constexpr float kSentinelLogit = -1e30f;
 constexpr int kLanes = 8;
 
@@ -349,7 +349,7 @@ MAQ_SIMD_CLONES float part_confidence(const DenseLogits& logits, float mask_thre
       float total = 0;
       for (int c = 0; c < parts; ++c) {
         const float below = values[c] - best;
-        total += below > -87.0f ? exp_of_negative(below) : 0;  // 0 for what is no number too
+        total += below > -87.0f ? exp_of_negative(below) : 0;  // 0 also for NaN
       }
       sum += double(1 / total);
       ++count;

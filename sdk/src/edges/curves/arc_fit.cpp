@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586;
 constexpr double kMinHeight = 3;       // of an arc over its chord, in the root mean square of its points' distances
-constexpr double kLargestRadius = 60;  // in the length of what is seen of it: 1 degree is a line
+constexpr double kLargestRadius = 60;  // over its visible length: 1 degree is a line
 
 }  // namespace
 

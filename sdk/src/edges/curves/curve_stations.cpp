@@ -18,7 +18,7 @@ constexpr double kBestAcross_px = 0.08;       // lower limit of the uncertainty 
 constexpr double kSamePlace_px = 1;           // edges of a near and a far surface this close in the image are one chain
 constexpr double kApart_r = 2;                // edges of surfaces nearer than this are one
 constexpr double kNoisy_r = 1.5, kWider = 3;  // depth that is so far from its surface needs a band so much wider
-constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // what is that much worse is another surface, or smears
+constexpr double kSameNoise = 1.5, kSameSurface = 1.2;  // worse pixels: another surface, or flying pixels
 constexpr int kStray = 2;                               // stations that may have seen something else
 constexpr double kFarthestPlanes_px = 0.6;  // surfaces that meet farther from the field's edge bend, or are others
 
@@ -155,7 +155,7 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, c
 
 SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                      int side, double half_window_px, bool may_bend) {
-  // Away from what smears; where the surface is too narrow for that, nearer.
+  // Outside of the band of flying pixels, or nearer if the surface is too narrow.
   const Band band{side, half_window_px, double(options.flying_pixel_band_px) + double(options.fit_band_px), 1};
   for (const double smear : {1.0, 0.5, 0.15}) {
     band_.clear();
@@ -171,8 +171,8 @@ SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions&
   return patch;
 }
 
-// Noisy depth needs a wide band, of whose pixels a quarter will do: all of it where depth at the edge is no worse than
-// elsewhere, else what is away from the edge.
+// Noisy depth needs a wide band, but a quarter of its pixels is enough: all of the band if depth at the edge is as good
+// as elsewhere, or else its part away from the edge.
 SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
                                            int side, double half_window_px, bool may_bend) {
   const double focal = focal_px(field.intrinsics), away_px = double(options.flying_pixel_band_px) + 0.5;
@@ -225,7 +225,7 @@ void CurveStations::fit_sides(const EdgeField& field, const CurveOptions& option
 }
 
 // One plane for all of a straight chain where it is as near to the pixels as a patch at each station. Stations at its
-// ends may have seen other surfaces: those far worse than most are left out.
+// ends may have seen other surfaces: stations far worse than most are left out.
 void CurveStations::fit_whole_sides(const EdgeField& field) {
   whole_side = {};
   for (size_t side = 0; side < 2 && is_straight; ++side) {
@@ -364,8 +364,8 @@ void CurveStations::find_runs(bool is_closed) {
   }
 }
 
-// One step of Gauss-Newton at each station: the edge moves across so that the distances of the pixels beside it, each
-// on its surface, become those of the field.
+// One step of Gauss-Newton at each station: the edge moves sideways until the distances of the adjacent pixels, each on
+// its surface, match the field.
 void CurveStations::move_across(const EdgeField& field) {
   const Intrinsics& camera = field.intrinsics;
   const double max_r = 0.9 * double(field.eps_r), focal = focal_px(camera);

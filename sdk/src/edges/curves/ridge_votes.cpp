@@ -101,8 +101,8 @@ void RidgeVotes::gather(const EdgeField& field, float vote_radius_px, CurveCount
         continue;
       const Gradient g = gradient_at(field, x, y);
       const float slope = std::hypot(g.x, g.y);
-      // A pixel is at least one r wide, so a smaller slope is that of a ridge within the window. On the ridge itself
-      // both sides cancel. A field without a slope casts no vote.
+      // A pixel is at least one r wide: a smaller slope means a ridge within the window. On the ridge itself both sides
+      // cancel. A field without a slope casts no vote.
       const float step_px = distance / std::max(slope, 1.0f);
       if (!g.is_known || !(slope > 0.25f) || step_px > vote_radius_px || is_at_jump(field, x, y)) continue;
       ++counts.voting_pixels;

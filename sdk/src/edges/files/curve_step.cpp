@@ -106,7 +106,7 @@ class StepWriter {
     return arc.is_closed ? last_ : add_trimmed(name, last_, arc.sweep_rad);
   }
 
-  // Its knots are even: one more in each place between the ends, four in those.
+  // Its knots are even: single knots between the ends, four at each end.
   int add_spline(const std::string& name, const Vec3* controls, int count) {
     std::vector<int> points;
     for (int i = 0; i < count; ++i) points.push_back(add_point(controls[i]));

@@ -114,7 +114,8 @@ class CurveFusion::Merger {
     return whole(p.x, dx) | whole(p.y, dy) << 21 | whole(p.z, dz) << 42;
   }
 
-  // Calls visit(index) for places near a spot that run the same way, within `reach` footprints of the larger of both.
+  // Calls visit(index) for points near a position with the same direction, within `reach` footprints of the larger of
+  // both.
   template <class Visit>
   void visit_beside(const Spot& spot, double r_m, double reach, Visit visit) {
     for (int dz = -1; dz <= 1; ++dz) {

@@ -82,7 +82,7 @@ void HeadEncoder::run(const ImageView& photo, const HeadSquare& square, const Ru
   check_square(square, photo.width_px, photo.height_px);
   const int crop_px = spec_.crop_px();
   encoding.crop_to_photo = crop_to_photo(square, crop_px);
-  // Zero, what lies beyond the photo, is grey.
+  // Zero is grey, the value beyond the photo.
   NetworkInputSpec as_bytes;
   as_bytes.mean = {kGrey, kGrey, kGrey};
   as_bytes.std = {1, 1, 1};

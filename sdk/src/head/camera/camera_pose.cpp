@@ -234,8 +234,9 @@ class PoseSearch {
   double centre_x_ = 0, centre_y_ = 0, radius_px_ = 0, sigma_px_ = 1, coarse_limit_ = 0, best_fraction_ = 0;
 };
 
-// On one line, or in one place, but for up to three of many: what so few say of the turn about a line may be an
-// outlier's word. Lines through random pairs, since an outlier far off would tilt the one of least squares.
+// True if all points but up to three of many are on one line or at one position: so few points may be outliers, and
+// cannot decide the rotation about the line. Lines through random pairs, since an outlier far off would tilt the one of
+// least squares.
 bool are_collinear(const std::vector<PosePoint>& points, const std::vector<size_t>& chosen) {
   const size_t count = chosen.size(), spare = std::min(size_t(3), (count - 4) / 4);
   Dice dice;

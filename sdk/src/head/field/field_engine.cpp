@@ -34,7 +34,7 @@ void take(const ConstPlanes& from, size_t begin, size_t count, float* rows) {
 
 static_assert(kFieldBlock == 64, "points of a block are bits of a number");
 
-// The points of which one of some rows is not finite.
+// Finds points with a value that is not finite in some rows.
 uint64_t not_finite(const float* rows, size_t row_count) {
   constexpr float kMax = std::numeric_limits<float>::max();
   int bad[kBlock] = {}, any = 0;
@@ -266,7 +266,7 @@ void FieldEngine::forward(const FieldPoints& points, FieldWorkspace& workspace, 
       left_out |= not_finite(memory.points, 3);
       put(memory.points, begin, count, values.normal);
     }
-    // So that a gradient of 0 times what is kept is 0.
+    // A gradient of 0 times a kept value is then 0.
     clear(left_out, at.encoding, kept_rows(has_surface, has_normals));
   }
   workspace.is_kept_ = true;
@@ -340,9 +340,9 @@ void FieldEngine::geometry_backward(const Block& at, const Sums& sums, int used,
 }
 
 // A loss L(n) of the normal n, the gradient of the distance f by the point: with u = dL/dn held fast, L's gradient by
-// the weights is that of u · n, which is the derivative of f as the point moves along u. So one tangent, along u, is
-// carried forwards through the geometry and differentiated backwards. The gradient by the activations' tangents is that
-// of f by the activations, which forward() kept (slopes).
+// the weights is the gradient of u · n, which is the derivative of f as the point moves along u. So one tangent, along
+// u, is carried forwards through the geometry and differentiated backwards. The gradient by the activations' tangents
+// is the gradient of f by the activations, which forward() kept (slopes).
 void FieldEngine::run_tangents(const Block& at, const Scratch& scratch) const {
   kernels_->encode_tangent(at.encoding, scratch.direction, shape_.octaves, scratch.tangents);
   const float* in = scratch.tangents;

@@ -53,7 +53,7 @@ HeadCamera camera_of(const StoredCamera& stored) {
   return camera;
 }
 
-// Throws unless what the head claims is what the file has room for.
+// Throws unless the head's counts fit the size of the file.
 void check_counts(const HeadFileHead& head, const FieldShape& shape, const StoredBytes& file) {
   if (head.shape_codes > uint32_t(kMaxFieldCodes) || head.colour_codes > uint32_t(kMaxFieldCodes) ||
       head.cameras > kMaxStoredCameras || head.anchors > kMaxHeadAnchors || head.landmarks > kMaxNamedPoints) {

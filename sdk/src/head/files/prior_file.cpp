@@ -15,7 +15,7 @@ constexpr char kPriorRemedy[] = "Export the bundle again, or use the Maquette th
 
 Vec3 vector_of(const float (&values)[3]) { return {values[0], values[1], values[2]}; }
 
-// Throws unless what the head claims is what the file has room for.
+// Throws unless the head's counts fit the size of the file.
 void check_counts(const PriorFileHead& head, const FieldShape& shape, const StoredBytes& file) {
   if (head.constant_format > StoredFormat::kFloat16 || head.bases_format > StoredFormat::kInt8 ||
       head.zero[0] + head.zero[1] > 0 ||

@@ -148,7 +148,7 @@ class JointFit {
 };
 
 // A camera within the head is none. One that sees more of the far side of the head than of the near one, which without
-// perspective looks the same, is that of a mirrored picture.
+// perspective looks the same, is that of a mirrored image.
 PoseStatus checked(const CameraPose& pose, const std::vector<Correspondence>& points) {
   if (!(pose.camera.head_to_camera.translation.z > 0)) return PoseStatus::kNoConsensus;
   const Vec3 eye = inverse(pose.camera.head_to_camera) * Vec3{};
@@ -172,7 +172,7 @@ void check(const std::vector<HeadPhoto>& photos, const AnchorFitOptions& options
   }
 }
 
-// Empty: that of the prior, the identity.
+// Empty: the prior's covariance, the identity.
 void set_covariance(AnchorFit& fit, std::vector<float> covariance) {
   const size_t codes = fit.shape_codes.size();
   if (covariance.empty()) {

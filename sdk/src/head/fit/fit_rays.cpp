@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kHead = 0.5, kInner = 0.9;  // of a matte; beyond this, no background shows through
 constexpr double kMaxSpread_dm = 0.25;       // of the template points of neighbours on one surface
-constexpr int kHeldOutCells = 3;             // cells a side of what is held out
+constexpr int kHeldOutCells = 3;             // cells in a side of a held-out square
 
 uint64_t mixed(uint64_t z) {  // SplitMix64
   z += 0x9e3779b97f4a7c15u;

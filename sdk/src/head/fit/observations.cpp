@@ -30,7 +30,7 @@ bool is_inside(const HeadCell& cell, int width_px, int height_px) {
          (height_px <= 0 || (cell.y_px >= -0.5 && cell.y_px < height_px - 0.5));
 }
 
-// From the axes of the crop to those of the photo.
+// Converts from the axes of the crop to the axes of the photo.
 Vec3 turned(const AffineMap& map, Vec3 n) {
   const double scale = 1 / std::sqrt(map.xx * map.yy - map.xy * map.yx);
   return normalized({scale * (map.xx * n.x + map.xy * n.y), scale * (map.yx * n.x + map.yy * n.y), n.z});

@@ -48,7 +48,7 @@ void RayOpacity::back(const float* by_weights, double by_log_transmittance, floa
   const size_t sections = weights_.size();
   std::fill(by_distances, by_distances + sections + 1, 0.0F);
   if (is_clear_) return;
-  double behind = by_log_transmittance;  // what all sections behind say of log(1 - alpha)
+  double behind = by_log_transmittance;  // sum of all sections behind, for log(1 - alpha)
   double by_end = 0;                     // of the far end of the section, by the section behind it
   for (size_t i = sections; i-- > 0;) {
     const double by_weight = double(by_weights[i]);

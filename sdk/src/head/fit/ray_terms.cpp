@@ -165,7 +165,7 @@ void RayTerms::run_mattes(const Call& call, Track* tracks, size_t count, FieldPa
     }
     for (size_t k = 0; k < sections && !track.is_hit; ++k) {
       if (!(distances[k] > 0) || !(distances[k + 1] <= 0)) continue;
-      if ((at_cut >> k & 3) != 0) break;  // goes in through the cut, of which nothing is known
+      if ((at_cut >> k & 3) != 0) break;  // goes in through the clip plane, where nothing is known
       track.is_hit = true;
       track.outside = depth_at(track, k), track.inside = depth_at(track, k + 1);
       track.f_outside = double(distances[k]), track.f_inside = double(distances[k + 1]);

@@ -177,8 +177,8 @@ class SurfaceFinder {
     }
   }
 
-  // From large blocks to those of two cells: what may hold a piece of the surface by the value at its centre. Those
-  // centres are points of the grid, so no value is lost.
+  // Refines large blocks to blocks of two cells: a block is kept if the value at its centre allows a piece of the
+  // surface. The centres are points of the grid, so no value is lost.
   void find_blocks() {
     std::vector<Index3> blocks, kept, centres;
     std::vector<float> values;

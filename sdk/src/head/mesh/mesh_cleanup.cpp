@@ -33,7 +33,8 @@ uint32_t root_of(std::vector<uint32_t>& parents, uint32_t of) {
   return of;
 }
 
-// Moves the kept vertices together; `numbers` has the new number of each, or the largest for those that go.
+// Moves the kept vertices together; `numbers` has the new index of each vertex, or the largest number for a removed
+// vertex.
 template <class T>
 void compact(std::vector<T>& values, const std::vector<uint32_t>& numbers, size_t kept) {
   if (values.empty()) return;

@@ -21,7 +21,7 @@ void append_word(std::vector<uint8_t>& to, uint32_t word) {
   to.insert(to.end(), bytes, bytes + sizeof word);
 }
 
-// Numbers as C writes them; exactly those of the floats.
+// Numbers in the notation of C; they equal the floats exactly.
 std::string text_of(const std::array<float, 3>& values) {
   std::ostringstream text;
   text.imbue(std::locale::classic());

@@ -30,7 +30,7 @@ constexpr int kBandRows = 16, kMaxSide = 16384;
 constexpr size_t kTask = 8192, kChunk = 256;  // vertices or triangles; a task has whole chunks
 constexpr uint32_t kNoTriangle = UINT32_MAX;
 constexpr size_t kMaxSamples = 4;          // of a pixel
-constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther ones are of what is behind
+constexpr float kSameSurface = 1 / 1.02f;  // of inverse depths in a pixel: farther samples are of another surface
 
 // A linear function of the pixel: a column + b row + c.
 struct Plane {
@@ -52,8 +52,8 @@ struct Setup {
   bool is_seen = false;
 };
 
-// Six times the volume of the triangle and the camera's centre; 0 for triangles without an area, and those seen from
-// their side. Positive for those seen from behind.
+// Six times the volume of the triangle and the camera's centre; 0 for triangles without an area and triangles seen
+// edge-on. Positive for triangles seen from behind.
 template <class Vertex>
 double volume_of(const Vertex& p, const Vertex& q, const Vertex& r) {
   return p.x * (q.y * r.z - q.z * r.y) + p.y * (q.z * r.x - q.x * r.z) + p.z * (q.x * r.y - q.y * r.x);

@@ -30,7 +30,7 @@ MeshTexture::MeshTexture(const ImageView& bgr) {
 
 int MeshTexture::level_of(double texels, double pixels) const {
   int level = 0;
-  // Half way between two levels, a texel of the one is as much too small as that of the other is too large.
+  // Half way between two levels, texels of one level are as much too small as texels of the other are too large.
   for (double of_pixel = texels / pixels; of_pixel > 2 && level + 1 < int(levels_.size()); of_pixel /= 4) ++level;
   return level;
 }
@@ -39,7 +39,7 @@ std::array<float, 3> MeshTexture::colour(float u, float v, int level) const {
   const Level& of = levels_[size_t(level)];
   const auto texel = [](float at, int count, int& first, int& second) {
     const float given = at * float(count) - 0.5f;
-    const float along = given > 0 ? std::min(given, float(count - 1)) : 0.0f;  // 0 also for what is no number
+    const float along = given > 0 ? std::min(given, float(count - 1)) : 0.0f;  // 0 also for NaN
     first = int(along);
     second = std::min(first + 1, count - 1);
     return along - float(first);

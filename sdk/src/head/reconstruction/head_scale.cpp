@@ -16,7 +16,7 @@ constexpr double kMinLandmarkDistance = 0.01;  // units
 constexpr double kMaxAspectError = 0.01;
 constexpr double kCell_m = 0.004;    // of the mesh that depth is compared with: within 0.3 mm of the surface
 constexpr float kFacing = -0.5f;     // normals beyond: within 60 degrees of the camera
-constexpr double kAgreement = 0.15;  // of the median: what is farther off is hair, a hand, the background
+constexpr double kAgreement = 0.15;  // of the median: pixels farther off are hair, a hand, the background
 constexpr size_t kMinPixels = 30;
 constexpr double kSigmaOfMad = 1.4826;  // of a normal distribution
 

@@ -136,7 +136,7 @@ class Registration {
     }
   }
 
-  // Displaces points as their neighbours are on average, in so many steps of Jacobi's method.
+  // Displaces points like the mean of their neighbours, by steps of Jacobi's method.
   void follow(const std::vector<size_t>& points, int sweeps) {
     std::vector<Vec3> made(points.size());
     for (int sweep = 0; sweep < sweeps; ++sweep) {
@@ -178,8 +178,8 @@ class Registration {
   }
   bool is_skin(size_t i) const { return head_.kinds[i] == TemplateKind::kSurface; }
 
-  // Points that did not find their place, and those of flipped triangles, are let go of: they follow their neighbours,
-  // together with the skin inside, which would hold lips and lids where it is. Where that is not enough, so do these.
+  // Points without a good position, and points of flipped triangles, are let go: they follow their neighbours, together
+  // with the skin inside, which would hold lips and lids in place. Where that is not enough, so do these.
   void let_go() {
     evaluate_field();
     std::vector<uint8_t> is_loose(count_);

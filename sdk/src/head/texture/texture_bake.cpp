@@ -126,7 +126,7 @@ std::array<double, kChannels> between_pixels(const std::vector<T>& values, int w
   return made;
 }
 
-// In place of the mesh's colours those of a texture, whatever its size.
+// Replaces the mesh's colours by the colours of a texture of any size.
 void take_colours(const TextureImage& from, int side, Texels& texels) {
   const double scale = double(from.side_px) / double(side);
   for (size_t i = 0; i < texels.is_surface.size(); ++i) {
@@ -138,8 +138,8 @@ void take_colours(const TextureImage& from, int side, Texels& texels) {
   }
 }
 
-// How much of 5 x 5 pixels around a place show a surface at this depth, or one behind it: 0 at what hides it and just
-// beside that, as a fitted edge is not quite where the photo's is.
+// Fraction of the 5 x 5 pixels around a position that show a surface at this depth or behind it. It is 0 at an occluder
+// and just next to it, because a fitted edge is not exactly at the photo's edge.
 double seen_fraction(const RenderedImage& depths, double x, double y, double depth, int spacing_px) {
   int seen = 0;
   for (int j = -2; j <= 2; ++j) {
@@ -193,7 +193,7 @@ Differences differences_of(const TexturePhoto& photo, const HeadMesh& mesh, cons
   return made;
 }
 
-// All photos together: what each differs by without its mean, and the mean over all.
+// All photos together: the differences of each without its mean, and the mean over all.
 Differences blend(const std::vector<TexturePhoto>& photos, const HeadMesh& mesh, const Texels& texels, int side,
                   WorkerThreads& threads) {
   Differences all;
@@ -232,7 +232,7 @@ Differences blend(const std::vector<TexturePhoto>& photos, const HeadMesh& mesh,
   return all;
 }
 
-// Where one side is not known, what the other is.
+// Fills an unknown side from the other side.
 Differences mirrored(const Differences& known, const Texels& texels, int side) {
   Differences made = known;
   for (size_t row = 0; row < size_t(side); ++row) {
@@ -249,7 +249,7 @@ Differences mirrored(const Differences& known, const Texels& texels, int side) {
   return made;
 }
 
-// The mesh's colours become what they would be in the photos' light, and differences are then from these.
+// The mesh's colours are converted to the photos' light; differences are then relative to them.
 PhotoLight match_light(Texels& texels, Differences& seen) {
   const PhotoLight light = fit_photo_light(seen.weights, texels.colours, seen.values, texels.normals);
   for (size_t i = 0; i < seen.weights.size(); ++i) {

@@ -83,7 +83,7 @@ void ClipWriter::end_encoding() {
 }
 
 void ClipWriter::begin(const ImageView& first) {
-  // FFmpeg takes what is before a colon for a protocol, but not behind a slash.
+  // FFmpeg takes the text before a colon for a protocol, but not after a slash.
   const std::string& path = file_.temporary_path();
   const int width = first.width_px / 2 * 2, height = first.height_px / 2 * 2;
   encoder_ = file_codecs().begin_clip(path.front() == '/' ? path : "./" + path, format_, fps_, width, height);

@@ -5,8 +5,8 @@
 namespace maq {
 namespace {
 
-// Codecs fail without memory as they fail for damaged files. So memory is looked for after each failure; what it was
-// short for only for a moment is done once more.
+// Codecs fail without memory as they fail for damaged files. Memory is therefore checked after each failure; if it was
+// short only for a moment, the call is repeated.
 class MemoryCheckedCodecs : public FileCodecs {
  public:
   explicit MemoryCheckedCodecs(const FileCodecs& codecs) : codecs_(codecs) {}

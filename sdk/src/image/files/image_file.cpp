@@ -14,7 +14,7 @@
 namespace maq {
 namespace {
 
-// Over what an image of MAQ_MAX_PIXELS takes without compression, at 16 bits and four channels.
+// More than an uncompressed image of MAQ_MAX_PIXELS, at 16 bits and four channels.
 constexpr uint64_t kMaxImageBytes = uint64_t(1) << 30;
 
 constexpr char kFormats[] = "JPEG, PNG, WebP, BMP or TIFF";
@@ -24,7 +24,7 @@ constexpr char kFormats[] = "JPEG, PNG, WebP, BMP or TIFF";
               " file.");
 }
 
-// The format of an image by its first bytes. Throws for those that are not read.
+// The format of an image by its first bytes. Throws for unsupported formats.
 ImageFormat format_of(const EncodedBytes& start, const std::string& origin) {
   const auto [format, name] = recognise_format(start);
   if (format == ImageFormat::kClip) {

@@ -18,8 +18,8 @@
 namespace maq {
 namespace {
 
-// The library never prints, but OpenCV tells stderr what it dislikes in a file. How much, is one number for the
-// process: while one of these is alive it is the lowest, and afterwards what the app had.
+// The library never prints, but OpenCV writes complaints about a file to stderr. Its log level belongs to the process:
+// while an object of this class is alive it is the lowest, and afterwards the app's level.
 class OpenCvSilence {
  public:
   OpenCvSilence() {
@@ -40,8 +40,9 @@ class OpenCvSilence {
 };
 
 // FFmpeg tells stderr too, on threads of its own, and OpenCV sets its level anew whenever it opens a clip. So the log
-// callback of the process is replaced: while one of these is alive nothing is said, afterwards what FFmpeg's own says.
-// There is no function that returns the callback before: this one is set once, so that an app's, set later, stays.
+// callback of the process is replaced: while an object of this class is alive nothing is printed, afterwards FFmpeg's
+// own callback is back. There is no function that returns the callback before: this one is set once, so that an app's,
+// set later, stays.
 class FfmpegSilence {
  public:
   FfmpegSilence() {
@@ -64,7 +65,7 @@ class FfmpegSilence {
   static void log(void* object, int level, const char* format, va_list arguments) {
     if (users_ == 0) default_(object, level, format, arguments);
   }
-  // FFmpeg comes with OpenCV, without headers: its functions are looked up in what this module needs.
+  // FFmpeg comes with OpenCV, without headers: its functions are looked up in this module's dependencies.
   static void* find(const char* function) {
     Dl_info info{};
     static const int here = 0;

@@ -33,7 +33,7 @@ MAQ_SIMD_CLONES void to_floats(const uint8_t* from, size_t count, float* to) {
 // --- bilinear: weights of 11 fractional bits, the vertical sum of rows that lost 4 of them
 // -----------------------------
 
-// Between which two old pixels each new one is, and what they weigh.
+// The two old pixels around each new one, and their weights.
 struct LinearAxis {
   struct Between {
     int first, second;
@@ -41,8 +41,8 @@ struct LinearAxis {
   };
   std::vector<Between> at;
 
-  // Before the first centre OpenCV lets the weights of rows be, which both fall to the first row, but not those of
-  // columns.
+  // Before the first centre OpenCV keeps the weights of rows, which both count for the first row, but not the weights
+  // of columns.
   LinearAxis(int from_px, int to_px, bool are_columns) : at(size_t(to_px)) {
     const double scale = pixels_per_pixel(from_px, to_px);
     for (int i = 0; i < to_px; ++i) {

@@ -16,7 +16,7 @@ struct Neighbours {
 
 inline Neighbours neighbours(double at, int size) {
   const double last = size - 1;
-  const double clamped = at >= 0 ? (at <= last ? at : last) : 0;  // 0 for what is no number too
+  const double clamped = at >= 0 ? (at <= last ? at : last) : 0;  // 0 also for NaN
   const int first = int(clamped);
   return {first, std::min(first + 1, size - 1), clamped - first};
 }

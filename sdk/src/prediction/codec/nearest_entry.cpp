@@ -14,7 +14,8 @@ using Vector = float __attribute__((vector_size(4 * kVector)));
 using Stored = float __attribute__((vector_size(4 * kVector), aligned(4), may_alias));
 using Blocks = int32_t __attribute__((vector_size(4 * kVector)));
 
-// Takes kTogether vectors, `stride` floats apart. |v - e|^2 / 2 without what all entries have alike: |e|^2 / 2 - v e.
+// Takes kTogether vectors, `stride` floats apart. |v - e|^2 / 2 without the part that is equal for all entries: |e|^2 /
+// 2 - v e.
 MAQ_SIMD_CLONES void nearest_of_four(const float* vectors, size_t stride, size_t width, const float* entries,
                                      const float* half_squares, size_t blocks, uint16_t* found, size_t found_stride) {
   constexpr float kFar = std::numeric_limits<float>::infinity();

@@ -61,7 +61,7 @@ void mean_of_columns(const int* sums, int width, int scale, int rows, float* mea
   means[x] = float(sum) / float(256 * (width - x * scale) * rows);
 }
 
-// (1, 2, 1) / 4 both ways: noise and what lies between pixels would pass for motion.
+// (1, 2, 1) / 4 both ways: noise and detail between pixels would look like motion.
 void smooth_row(const float* __restrict above, const float* __restrict here, const float* __restrict below, int width,
                 float* __restrict columns, float* __restrict smooth) {
   for (int x = 0; x < width; ++x) columns[x + 1] = (above[x] + here[x] + (here[x] + below[x])) * 0.25f;

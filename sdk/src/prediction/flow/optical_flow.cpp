@@ -9,8 +9,8 @@ namespace maq {
 namespace {
 
 constexpr int kStep_px = kPatch_px / 2;  // patches overlap by half
-// Standing still explains the image where moving leaves more than this part of the squared differences; beside it,
-// what rounding to whole grey levels leaves.
+// Standing still explains the image where moving leaves more than this part of the squared differences; plus the error
+// of rounding to whole grey levels.
 constexpr float kMovedFraction = 0.7f, kOwnFraction = 0.85f, kRounding = 0.1f;
 constexpr int kNeighbours = 3;     // patches to each side that are judged together
 constexpr float kAlike_px = 0.5f;  // displacements of neighbours that need not be tried
@@ -123,8 +123,8 @@ void OpticalFlow::densify(const LumaLevel& from, const LumaLevel& to, WorkerThre
   });
 }
 
-// Means over 5 x 5 pixels: errors of neighbours cancel, and they would grow with the time ahead. What is 0 around stays
-// 0.
+// Means over 5 x 5 pixels: errors of neighbours cancel, and they would grow with the time ahead. Values with zeros
+// around stay 0.
 void OpticalFlow::smooth(WorkerThreads& threads, FlowField& flow) {
   constexpr int kRadius_px = 2;
   const int width = flow.width_px, height = flow.height_px;

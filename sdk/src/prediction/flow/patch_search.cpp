@@ -131,7 +131,7 @@ MAQ_SIMD_CLONES void search_clones(const LumaLevel& from, const LumaLevel& to, i
     const Residual now = residual_of(patch, position_of(to, float(x) + next.dx, float(y) + next.dy), to.stride());
     bool is_better = now.mean_square < at_best.mean_square;
     if (i < count && is_found) is_better = now.mean_square < kBetter * at_best.mean_square;
-    // Without texture the two may tie: the coarser level saw more of the picture.
+    // Without texture the two may tie: the coarser level saw more of the image.
     if (i < count && !is_found) is_better = i == 0 || now.mean_square <= at_best.mean_square;
     if (i == 0 && !is_found) found.still = now.mean_square;
     if (is_better) {

@@ -17,7 +17,7 @@ struct Solved {
 };
 
 // The view-dependence of a descriptor: the root of the mean square of |(h - mean h) beta| over the photos that saw the
-// point. The triangle R has the scatter of h as R^T R, so that the sum of squares is that of R beta.
+// point. The triangle R has the scatter of h as R^T R, so the sum of squares equals the one of R beta.
 float view_dependence_of(const DescriptorRegression& regression, const float beta[kBasis][kFeatures]) {
   double sum = 0;
   const float* row = regression.triangle;

@@ -14,7 +14,7 @@ struct ColmapModelInfo {
   size_t parameters;
 };
 
-// In the order of ColmapModel; numbers are those of binary files.
+// In the order of ColmapModel; numbers are the values in binary files.
 constexpr ColmapModelInfo kColmapModels[] = {{"SIMPLE_PINHOLE", 0, 3}, {"PINHOLE", 1, 4}, {"SIMPLE_RADIAL", 2, 4},
                                              {"RADIAL", 3, 5},         {"OPENCV", 4, 8},  {"OPENCV_FISHEYE", 5, 8},
                                              {"FULL_OPENCV", 6, 12}};
@@ -86,7 +86,7 @@ class Line {
   size_t at_ = 0;
 };
 
-// How many there are, of which each takes `min_bytes` or more.
+// Reads the number of elements; each takes `min_bytes` or more.
 uint64_t read_count(FileReader& file, uint64_t min_bytes, const char* what) {
   const auto count = file.number<uint64_t>();
   if (count > file.remaining() / min_bytes) {

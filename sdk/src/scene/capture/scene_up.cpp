@@ -18,7 +18,7 @@ Vector3 cross(const Vector3& a, const Vector3& b) {
 std::array<double, 3> up_of_cameras(const std::vector<std::array<double, 9>>& rotations) {
   if (rotations.empty()) return {0, 0, 1};
   Vector3 mean{};
-  // The rows of a symmetric matrix: sum of x x^T, where x is the first row, what is to the right in the picture.
+  // The rows of a symmetric matrix: sum of x x^T, where x is the first row, the direction to the right in the image.
   std::array<Vector3, 3> across{};
   for (const auto& rotation : rotations) {
     for (size_t i = 0; i < 3; ++i) {
@@ -26,12 +26,12 @@ std::array<double, 3> up_of_cameras(const std::vector<std::array<double, 9>>& ro
       for (size_t j = 0; j < 3; ++j) across[i][j] += rotation[i] * rotation[j];
     }
   }
-  constexpr double kFaintest = 0.05;  // of what it would be if all were the same
+  constexpr double kFaintest = 0.05;  // of its value if all were the same
   if (std::sqrt(dot(mean, mean)) < kFaintest * double(rotations.size())) {
     const auto& first = rotations[0];
     return {-first[3], -first[4], -first[5]};
   }
-  // Keeps the mean where x says nothing, and is far below what x says of cameras that stand ten degrees apart.
+  // Keeps the mean where x has no information, and is far below the information of x for cameras ten degrees apart.
   constexpr double kLevelling = 0.002;
   for (size_t i = 0; i < 3; ++i) across[i][i] += kLevelling * double(rotations.size());
   // The inverse of a symmetric matrix with rows a, b, c has rows b x c, c x a, a x b, over its determinant, which only

@@ -20,7 +20,7 @@ namespace maq {
 namespace {
 
 constexpr size_t kReadAtOnce = 1 << 20;  // a multiple of the alignment, and of a float
-// A little over what make_scene takes, since steps are rounded.
+// A little more than make_scene accepts, since steps are rounded.
 constexpr double kMaxStored = 2e30;
 
 bool is_sound(double value) { return std::abs(value) <= kMaxStored; }  // false for NaN
@@ -220,7 +220,7 @@ void check_blocks(const SceneFileReader& file, const std::vector<SceneBlock>& bl
 }
 
 struct StoredArrays {
-  std::vector<SceneBlock> blocks;  // copied: what was checked must stay so
+  std::vector<SceneBlock> blocks;  // copied: checked values must not change
   std::shared_ptr<const uint8_t> mapping;
   std::vector<uint8_t> memory;
 };

@@ -18,7 +18,8 @@ inline void sine_and_cosine(float x, float& sine, float& cosine) {
   cosine = 1 - b / 2 * (1 - b / 12 * (1 - b / 30 * (1 - b / 56 * (1 - b / 90 * (1 - b / 132)))));
 }
 
-// A block of one layer: `in` [inputs][kBlock] to `out` [outputs][kBlock]. Returns what follows the layer's weights.
+// A block of one layer: `in` [inputs][kBlock] to `out` [outputs][kBlock]. Returns the address after the layer's
+// weights.
 template <int inputs, int outputs, bool is_activated>
 inline const float* layer(const float* weights, const float* in, float* out) {
   const float* bias = weights + inputs * outputs;

@@ -38,7 +38,7 @@ inline void project_all(const Parameters& by, const PointSpan& span, int32_t* __
     // Behind the camera the pixel does not matter; the division must only not be by 0.
     const float safe = forward >= near ? forward : 1.0f;
     const float column = across / safe + cx, row = down / safe + cy;
-    // Comparisons with what is not finite are false. All are made, so that there are no jumps.
+    // Comparisons with values that are not finite are false. All are made, so that there are no jumps.
     const bool is_seen = bool(int(forward >= near) & int(forward <= far) & int(column >= -0.5f) & int(column < right) &
                               int(row >= -0.5f) & int(row < bottom));
     // The sum is rounded, on the last edge up to the pixel behind it.

@@ -25,7 +25,7 @@ namespace {
 
 // One is read while the others arrive.
 constexpr int kImages = 4;
-// After so many in a row that cannot be used, none will come.
+// After this many unusable images in a row, no usable one will come.
 constexpr int kMaxBadImages = 30;
 
 int64_t boottime_ns() {
@@ -155,7 +155,7 @@ class Camera2Camera final : public Camera {
     std::atomic<bool> is_held{false};  // until give_back()
   };
 
-  // Takes what a function of Android's makes.
+  // Takes ownership of an object that a function of Android made.
   template <class Object, class Result>
   class Out {
    public:

@@ -18,7 +18,7 @@ namespace maq::ndk {
 #if __has_include(<camera/NdkCameraManager.h>)
 namespace {
 
-// The type of the NDK that stands for one of ours.
+// The NDK's type for one of our types.
 template <class Type>
 struct Theirs {
   using type = Type;

@@ -23,7 +23,7 @@ constexpr int64_t kMaxLostInARow = 1000;
 
 bool contains(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
-// The vendor's library says what went wrong in its texts alone.
+// The vendor's library reports errors only as texts.
 maq_status status_of(const std::string& text, maq_status fallback) {
   if (contains(text, "ermission")) return MAQ_ERROR_NO_PERMISSION;
   if (contains(text, "in use") || contains(text, "IN_USE")) return MAQ_ERROR_BUSY;
@@ -71,7 +71,7 @@ ImageView view_of(const DepthAiFrame& frame) {
 
 class DepthAiCamera final : public Camera {
  public:
-  // `handle`: what the device was opened by.
+  // `handle`: name by which the device was opened.
   DepthAiCamera(const std::string& handle, std::unique_ptr<DepthAiSession> session, int buffers, const Log& log)
       : handle_(handle), log_(log), session_(std::move(session)), slots_(size_t(std::max(1, buffers))) {}
   ~DepthAiCamera() override { close(); }

@@ -18,7 +18,7 @@ void DepthAiControls::note(const DepthAiFrame& newest) {
 }
 
 maq_source_control_info DepthAiControls::info(maq_source_control which) const {
-  // The ranges are those that the vendor documents; the device starts with its automatics, which have no default value.
+  // The vendor documents the ranges. The device starts in automatic modes, which have no default value.
   const auto made = [](double min, double max, double default_value, double value) {
     return maq_source_control_info{0, min, max, 1, std::clamp(default_value, min, max), std::clamp(value, min, max)};
   };

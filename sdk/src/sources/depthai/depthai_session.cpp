@@ -18,7 +18,7 @@ constexpr dai::CameraBoardSocket kColour = dai::CameraBoardSocket::CAM_A;
 constexpr dai::CameraBoardSocket kLeft = dai::CameraBoardSocket::CAM_B;
 constexpr dai::CameraBoardSocket kRight = dai::CameraBoardSocket::CAM_C;
 constexpr std::pair<uint32_t, uint32_t> kStereoSizePx{640, 400};
-// Messages are taken in the queues' callbacks; what lies in the queues is thrown away.
+// Messages are taken in the queues' callbacks; the content of the queues is discarded.
 constexpr unsigned kQueueLength = 1;
 constexpr unsigned kControlQueueLength = 8;
 

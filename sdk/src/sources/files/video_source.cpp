@@ -27,7 +27,7 @@ class VideoSource : public Source {
  public:
   explicit VideoSource(SourceUri uri) : path_(uri.target), asked_fps_(uri.fps) {
     uri.expect_no_more_options("size and fps");
-    open_file(path_);  // throws for what is no file: decoders would wait for a pipe, and go back and forth in it
+    open_file(path_);  // throws for a path that is not a file: decoders would wait for a pipe, and seek in it
     open();
     const int width = clip_->width_px();
     const int height = clip_->height_px();
@@ -104,8 +104,8 @@ class VideoSource : public Source {
     return false;
   }
 
-  // Never runs backwards. Some decoders do not report the first frame's time (0), those of the last frames, which they
-  // held back to reorder them, or any: such frames divide what is left of the clip evenly.
+  // Never runs backwards. Some decoders do not report the time of the first frame (0), of the last frames (held back
+  // for reordering), or of any frame. Such frames divide the rest of the clip evenly.
   int64_t presentation_time_ns() const {
     const double reported_ms = clip_->position_ms();
     if (std::isfinite(reported_ms) && reported_ms > 0) {

@@ -158,8 +158,7 @@ bool LibcameraCamera::is_unplugged() const {
                      [](const std::string& entry) { return access(entry.c_str(), F_OK) != 0 && errno == ENOENT; });
 }
 
-// Tells the kernel that the processor is going to read the buffer, or has done so: its caches may hold what was in it
-// before.
+// Tells the kernel that the processor is going to read the buffer, or has done so: its caches may hold older content.
 void LibcameraCamera::synchronize(const Slot& slot, uint64_t flags) {
   for (const Mapping& mapping : slot.mappings) {
     dma_buf_sync request{flags | DMA_BUF_SYNC_READ};
@@ -218,7 +217,7 @@ Camera::Event LibcameraCamera::wait(int wake_fd, int timeout_ms, CameraBuffer& b
   buffer.slot = item->slot;
   buffer.sequence = metadata.sequence;
   buffer.damaged = !filled || (!format_.jpeg && used_bytes < slot.size_bytes);
-  // libcamera does not say of which clock its times are; on most cameras it is this one.
+  // libcamera does not name the clock of its times; on most cameras it is this one.
   const int64_t now_ns = monotonic_ns();
   const int64_t taken_ns = int64_t(std::min<uint64_t>(metadata.timestamp, INT64_MAX));
   const bool is_monotonic = taken_ns <= now_ns && taken_ns >= now_ns - kMaxFrameAgeNs;

@@ -32,7 +32,7 @@ const libcamera::ControlInfo* find(const libcamera::ControlInfoMap& offered, con
   return found == offered.end() ? nullptr : &found->second;
 }
 
-// Automatic focus is not a switch but one of several modes, of which two are used: continuous and manual.
+// Automatic focus is not a switch but one of several modes, two are used: continuous and manual.
 bool is_focus_mode(const libcamera::ControlId& id) { return id.id() == controls::AfMode.id(); }
 
 double from_libcamera(const libcamera::ControlId& id, double value) {

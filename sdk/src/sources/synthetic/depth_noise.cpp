@@ -61,7 +61,7 @@ void DepthNoise::see_by_stereo(const SolidsPicture& picture, float* metres) {
     errors_[pixel] = float(normal(pixel));
   }
   for (int y = 0; y < height; ++y) {
-    // In the other camera, to the right, the leftmost column that a pixel farther right is at: what lies right of it is
+    // In the other camera, to the right, the leftmost column that a pixel farther right is at: pixels right of it are
     // covered there.
     double covered_from = width;
     for (int x = width - 1; x >= 0; --x) {

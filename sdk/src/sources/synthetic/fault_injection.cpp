@@ -78,7 +78,7 @@ class FaultyCamera : public Camera {
       }
       if (const auto lasts_ns = due(timeline.plan.stall)) stalled_until_ = after(*lasts_ns);
 
-      // Checks what is due every few milliseconds, also when no frame comes.
+      // Checks for due faults every few milliseconds, also when no frame comes.
       const auto now = Clock::now();
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count();
       const Event event = camera_->wait(wake_fd, int(std::clamp<int64_t>(left, 0, kCheckEveryMs)), buffer, reason);
@@ -127,7 +127,7 @@ class FaultyCamera : public Camera {
       buffer.jpeg_bytes /= 2;
       return;
     }
-    // The camera's own memory may be read-only. Depth goes with it, being in the same buffer.
+    // The camera's own memory may be read-only. Depth is dropped too: it is in the same buffer.
     std::lock_guard<std::mutex> lock(mutex_);
     const auto found = std::find_if(copies_.begin(), copies_.end(), [](const Copy& copy) { return copy.is_free; });
     Copy& copy = found == copies_.end() ? copies_.emplace_back() : *found;

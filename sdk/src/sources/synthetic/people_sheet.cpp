@@ -41,7 +41,7 @@ class MaskReader {
     return is_yes(probabilities[3]) ? 2 : 3;
   }
 
-  // `probability` of a yes, of 65536; moves 1/32 of the way to what came.
+  // `probability` of a yes, of 65536; moves 1/32 of the way to the decoded bit.
   bool is_yes(uint16_t& probability) {
     const uint32_t middle = low_ + uint32_t(uint64_t(high_ - low_) * probability >> 16);
     const bool yes = value_ <= middle;

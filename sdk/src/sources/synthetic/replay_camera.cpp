@@ -129,7 +129,7 @@ class ReplayCamera : public Camera {
       if (Clock::now() < next_->due) return Event::kTimeout;
       const ReplaySchedule::Next now = *next_;
       next_.reset();
-      // Frames of before the camera was opened, and those for which a device would have had no buffer left.
+      // Frames from before the camera was opened, and frames for which a device would have had no buffer left.
       if (now.due < opened_ || Clock::now() - now.due > max_delay_) continue;
       const int slot = free_slot();
       if (slot < 0) continue;  // the app holds all: the frame is lost

@@ -262,7 +262,7 @@ class V4l2Camera final : public Camera {
     set_rate(request.fps);
   }
 
-  // The driver has the last word, and what it says is checked before it is believed.
+  // The driver decides, and its answer is checked before it is used.
   void adopt(const Answer& agreed) {
     known_ = known_v4l2_format(agreed.fourcc);
     const bool is_sane = known_ != nullptr && agreed.memory_planes == known_->memory_planes && agreed.width_px >= 1 &&
@@ -352,7 +352,7 @@ class V4l2Camera final : public Camera {
     }
   }
 
-  // Points `buffer` at what the driver filled; false when there are fewer pixels than agreed.
+  // Points `buffer` at the memory that the driver filled; false if there are fewer pixels than agreed.
   bool show(const v4l2_buffer& filled, const v4l2_plane* planes, CameraBuffer& buffer) {
     Slot& slot = slots_[filled.index];
     const uint8_t* data[2] = {};

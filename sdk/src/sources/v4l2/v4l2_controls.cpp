@@ -73,7 +73,7 @@ bool offers_item(const V4l2Device& device, uint32_t id, const v4l2_queryctrl& fo
   return device.call(VIDIOC_QUERYMENU, &menu) == 0;
 }
 
-// Exposure is chosen by the item of a menu, of which each driver has some.
+// Exposure is chosen by an item of a menu; each driver has some of the items.
 std::optional<Range> exposure_modes(const V4l2Device& device, const v4l2_queryctrl& found, Range range) {
   const auto first = [&](int32_t best, int32_t other) -> int64_t {
     if (offers_item(device, V4L2_CID_EXPOSURE_AUTO, found, best)) return best;

@@ -45,7 +45,7 @@ HeadMesh square() {
   return mesh;
 }
 
-// In which the square is `side_px` wide and fills the picture.
+// In which the square is `side_px` wide and fills the image.
 HeadCamera camera_of(int side_px) {
   HeadCamera camera;
   camera.width_px = camera.height_px = side_px;

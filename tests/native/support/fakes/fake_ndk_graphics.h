@@ -87,7 +87,7 @@ class FakeNdkGraphics {
     const std::lock_guard<std::mutex> lock(mutex_);
     faults_[name] = {error, after, times};
   }
-  // Buffers have another size than asked for, or no memory, in so many pictures.
+  // Buffers have another size than asked for, or no memory, in so many images.
   void give_other_buffers(int times, bool have_no_memory = false) {
     const std::lock_guard<std::mutex> lock(mutex_);
     other_buffers_ = times;

@@ -58,7 +58,7 @@ inline maq_point_cloud cloud_of(const std::vector<float>& places) {
   return cloud;
 }
 
-// At (3, 0, 0), turned about the world's z; looks at the origin, z is up in the picture.
+// At (3, 0, 0), turned about the world's z; looks at the origin, z is up in the image.
 inline maq_pinhole_camera camera_at(double angle, int width_px = 64, int height_px = 48) {
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;

@@ -10,12 +10,17 @@ import pytest
 ROOT = Path(__file__).parents[3]
 BINDINGS = {
     "cpp": ("sdk/include/maquette", (".hpp",)),
-    "kotlin": ("android/maquette/src/main/cpp", (".cpp", ".h")),
+    "kotlin": ("android/maquette/src/main", (".cpp", ".h", ".kt")),
     "python": ("python/maquette", (".py",)),
 }
 UNBOUND = tomllib.loads(Path(__file__).with_name("unbound_functions.toml").read_text())
-# Functions that a binding calls by the type's name alone: maq_densepose stands for maq_densepose_create.
-BY_TYPE = re.compile(r"_(create|destroy|release|close|config_init)$")
+# Functions that a binding calls by the type's name alone: maq_densepose stands for maq_densepose_create. Structs of
+# Kotlin begin as zeros, the defaults: maq_densepose_config stands for maq_densepose_config_init.
+BY_TYPE = {
+    "cpp": re.compile(r"_(create|destroy|release|close|config_init)$"),
+    "kotlin": re.compile(r"_init$"),
+    "python": re.compile(r"_(create|destroy|release|close|config_init)$"),
+}
 
 
 def functions() -> set[str]:
@@ -32,7 +37,7 @@ def bound(binding: str) -> set[str]:
     folder, suffixes = BINDINGS[binding]
     files = [path for path in sorted((ROOT / folder).rglob("*")) if path.suffix in suffixes]
     named = set(re.findall(r"\bmaq_\w+", "\n".join(path.read_text() for path in files)))
-    return {name for name in functions() if name in named or BY_TYPE.sub("", name) in named}
+    return {name for name in functions() if {name, BY_TYPE[binding].sub("", name)} & named}
 
 
 @pytest.mark.parametrize("binding", BINDINGS)

@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.*
 import kotlin.math.roundToInt
 import kotlin.math.sqrt
 
@@ -38,7 +39,14 @@ class BodySurface internal constructor(private val points: FloatArray) {
     /** A copy of all, [24][nodes][nodes][3]: part - 1, U, V; x, y and z, which are NaN where a part has no point. */
     fun copyPoints(): FloatArray = points.clone()
 
-    private companion object {
-        const val PARTS = 24
+    internal companion object {
+        private const val PARTS = 24
+
+        /** null: the networks have no surface. */
+        fun of(fill: (maq_densepose_surface) -> Unit): BodySurface? =
+            orNull(Status.UNSUPPORTED) {
+                val surface = maq_densepose_surface().also(fill)
+                BodySurface(surface.points_m.floats(PARTS * 3 * surface.nodes * surface.nodes))
+            }
     }
 }

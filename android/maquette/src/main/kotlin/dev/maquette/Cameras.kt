@@ -1,5 +1,7 @@
 package dev.maquette
 
+import dev.maquette.jni.*
+
 /**
  * How a camera maps directions to pixels, in the convention of OpenCV: x to the right, y down, z forward; the centre of
  * the top left pixel is (0, 0). With x' = x / z and y' = y / z, distorted by the rational model, a point appears at
@@ -23,12 +25,19 @@ data class Intrinsics(
         require(distortion.size == 8) { "The distortion has ${distortion.size} numbers; it needs 8." }
     }
 
-    internal fun values(): DoubleArray =
-        doubleArrayOf(widthPx.toDouble(), heightPx.toDouble(), fxPx, fyPx, cxPx, cyPx) + distortion
+    internal fun writeTo(native: maq_intrinsics) {
+        native.width_px = widthPx
+        native.height_px = heightPx
+        native.fx_px = fxPx
+        native.fy_px = fyPx
+        native.cx_px = cxPx
+        native.cy_px = cyPx
+        native.distortion = distortion
+    }
 
     internal companion object {
-        fun of(v: DoubleArray) =
-            Intrinsics(v[0].toInt(), v[1].toInt(), v[2], v[3], v[4], v[5], v.slice(6 until 14))
+        fun of(native: maq_intrinsics) =
+            with(native) { Intrinsics(width_px, height_px, fx_px, fy_px, cx_px, cy_px, distortion) }
     }
 }
 
@@ -44,12 +53,25 @@ data class PinholeCamera(val intrinsics: Intrinsics, val rotation: List<Double>,
         require(centre.size == 3) { "The centre has ${centre.size} numbers; it needs 3." }
     }
 
-    internal fun values(): DoubleArray = intrinsics.values() + rotation + centre
+    internal fun native() =
+        maq_pinhole_camera().also {
+            intrinsics.writeTo(it.intrinsics)
+            it.rotation = rotation
+            it.centre = centre
+        }
 
     internal companion object {
-        fun of(v: DoubleArray) = PinholeCamera(Intrinsics.of(v), v.slice(14 until 23), v.slice(23 until 26))
+        fun of(native: maq_pinhole_camera) =
+            PinholeCamera(Intrinsics.of(native.intrinsics), native.rotation, native.centre)
     }
 }
 
+/** Red, green and blue of a colour of `android.graphics.Color`. */
+internal fun rgbOf(colour: Int?) = ByteArray(3) { ((colour ?: 0) shr (16 - 8 * it)).toByte() }
+
 /** A point in metres. */
-data class Point3(val x: Double, val y: Double, val z: Double)
+data class Point3(val x: Double, val y: Double, val z: Double) {
+    internal companion object {
+        fun of(xyz: List<Double>) = Point3(xyz[0], xyz[1], xyz[2])
+    }
+}

@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeScene
+import dev.maquette.jni.*
 
 /**
  * Posed photos of an environment and a point cloud, in a folder. Made by [Maquette.openCapture]. Photos are read when they are
@@ -8,7 +8,7 @@ import dev.maquette.jni.NativeScene
  */
 class Capture internal constructor(context: Long, folder: String) : AutoCloseable {
     internal val handle =
-        Handle(this, NativeScene.openCapture(context, folder.toByteArray()), NativeScene::closeCapture)
+        Handle(this, Native.maq_capture_open(context, textOf(folder)), Native::maq_capture_destroy)
 
     /**
      * A photo.
@@ -35,19 +35,18 @@ class Capture internal constructor(context: Long, folder: String) : AutoCloseabl
     val drops: List<Drop>
 
     init {
-        val info = handle.use(NativeScene::captureInfo)
-        pointCount = info[1].toLong()
-        up = info.drop(3)
+        val info = handle.read(maq_capture_info(), Native::maq_capture_get_info)
+        pointCount = info.point_count
+        up = info.up
         views =
-            List(info[0].toInt()) { index ->
-                val numbers = handle.use { NativeScene.viewNumbers(it, index) }
-                val name = handle.use { NativeScene.viewName(it, index) }.decodeToString()
-                View(name, PinholeCamera.of(numbers), numbers.last() != 0.0)
+            List(info.view_count) { index ->
+                val view = handle.read(maq_capture_view()) { it, view -> Native.maq_capture_get_view(it, index, view) }
+                View(view.name.text(), PinholeCamera.of(view.camera), view.is_held_out != 0)
             }
         drops =
-            List(info[2].toInt()) { index ->
-                val count = LongArray(1)
-                Drop(handle.use { NativeScene.drop(it, index, count) }.decodeToString(), count[0])
+            List(info.drop_count) { index ->
+                val drop = handle.read(maq_capture_drop()) { it, drop -> Native.maq_capture_get_drop(it, index, drop) }
+                Drop(drop.reason.text(), drop.count)
             }
     }
 
@@ -58,7 +57,7 @@ class Capture internal constructor(context: Long, folder: String) : AutoCloseabl
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for another index, [Status.NOT_FOUND] and
      *   [Status.UNREADABLE].
      */
-    fun loadView(index: Int): Frame = Frame(handle.use { NativeScene.loadView(it, index) })
+    fun loadView(index: Int): Frame = Frame(handle.use { Native.maq_capture_load_view(it, index) })
 
     /** Scenes built from it and frames loaded from it stay valid. */
     override fun close() = handle.close()

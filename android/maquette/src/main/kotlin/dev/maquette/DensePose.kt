@@ -2,42 +2,46 @@ package dev.maquette
 
 import android.graphics.Bitmap
 import android.hardware.HardwareBuffer
-import dev.maquette.jni.Native
-import dev.maquette.jni.NativePicture
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
 
 /** Finds people and maps each of their pixels to the body surface. Made by [Maquette.densePose]. */
 class DensePose internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, Native::destroyDensePose)
+    private val handle = Handle(this, pointer, Native::maq_densepose_destroy)
 
     /** What is computed for each pixel of a person. */
-    enum class Detail {
+    enum class Detail(internal val code: Int) {
         /** Part, U and V. */
-        SURFACE,
+        SURFACE(MAQ_DENSEPOSE_DETAIL_SURFACE),
 
         /** Only the part: faster. */
-        PART,
+        PART(MAQ_DENSEPOSE_DETAIL_PART),
     }
 
     /** What runs the layers of networks. */
-    enum class Provider {
+    enum class Provider(internal val code: Int) {
         /** ONNX Runtime's own kernels. */
-        CPU,
+        CPU(MAQ_PROVIDER_CPU),
 
         /** Those of XNNPACK, for networks of floats, on the CPU. */
-        XNNPACK,
+        XNNPACK(MAQ_PROVIDER_XNNPACK),
 
         /** Accelerators of the device; may be slower than the CPU: measure it. */
-        NNAPI,
+        NNAPI(MAQ_PROVIDER_NNAPI),
+        ;
+
+        internal companion object {
+            fun of(code: Int) = entries.first { it.code == code }
+        }
     }
 
     /** Whose surface is computed again from a crop of the frame in its full resolution, rotated upright. */
-    enum class PersonCrops {
-        OFF,
+    enum class PersonCrops(internal val code: Int) {
+        OFF(MAQ_DENSEPOSE_CROPS_OFF),
 
         /** Of people who are small in the networks' input, or lean. */
-        AUTO,
-        ALL,
+        AUTO(MAQ_DENSEPOSE_CROPS_AUTO),
+        ALL(MAQ_DENSEPOSE_CROPS_ALL),
     }
 
     /**
@@ -69,22 +73,20 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         val personCropPx: Int = 0,
         val provider: Provider = Provider.CPU,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                threads.toDouble(),
-                longSidePx.toDouble(),
-                scoreThreshold.toDouble(),
-                maxPeople.toDouble(),
-                resultPoolSize.toDouble(),
-                maxProposals.toDouble(),
-                keyFrameInterval.toDouble(),
-                minPersonHeightPx.toDouble(),
-                detail.ordinal.toDouble(),
-                if (allowSpinning) 1.0 else 0.0,
-                personCrops.ordinal.toDouble(),
-                personCropPx.toDouble(),
-                provider.ordinal.toDouble(),
-            )
+        internal fun native(bundle: ModelBundle) =
+            maq_densepose_config().also {
+                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.long_side_px = longSidePx
+                it.score_threshold = scoreThreshold
+                it.max_people = maxPeople
+                it.result_pool_size = resultPoolSize
+                it.max_proposals = maxProposals
+                it.key_frame_interval = keyFrameInterval
+                it.min_person_height_px = minPersonHeightPx
+                it.detail = detail.code
+                it.person_crops = personCrops.code
+                it.person_crop_px = personCropPx
+            }
     }
 
     /**
@@ -94,39 +96,43 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      *   [Status.CANCELLED] after [cancel].
      */
     fun run(frame: Frame): DensePoseResult =
-        handle.use { densePose -> frame.handle.use { DensePoseResult(Native.runDensePose(densePose, it)) } }
+        handle.use { densePose -> frame.handle.use { DensePoseResult(Native.maq_densepose_run(densePose, it)) } }
 
     /** Ends the [run] that runs, or else the next; from any thread. */
-    fun cancel() = handle.use(Native::cancelDensePose)
+    fun cancel() = handle.use(Native::maq_densepose_cancel)
 
     /**
      * The next frames show the world rotated clockwise by [rollRad] radians (-7 to 7), as of a phone that is held
      * askew: the networks see them rotated upright. From any thread. By the gravity sensor (`Sensor.TYPE_GRAVITY`) it is
      * `atan2(x, y)`, of x to the right and y up in the frame's picture; of a front camera `atan2(-x, y)`.
      */
-    fun setRoll(rollRad: Float) = handle.use { Native.setRollOfDensePose(it, rollRad) }
+    fun setRoll(rollRad: Float) = handle.use { Native.maq_densepose_set_roll(it, rollRad) }
 
     /** The next frame begins another stream: a key frame. */
-    fun reset() = handle.use(Native::resetDensePose)
+    fun reset() = handle.use(Native::maq_densepose_reset)
 
     /**
      * The body that parts, U and V refer to; null if the bundle has none. Blocks briefly the first time.
      *
      * @throws MaquetteException with [Status.BAD_BUNDLE] if it is damaged.
      */
-    fun surface(): BodySurface? = handle.use(Native::surfaceOfDensePose)?.let(::BodySurface)
+    fun surface(): BodySurface? = handle.use { native -> BodySurface.of { Native.maq_densepose_get_surface(native, it) } }
 
     override fun close() = handle.close()
 
     companion object {
         /** For [Config.threads]. */
-        const val THREADS_MEASURED = -1
+        const val THREADS_MEASURED = MAQ_THREADS_MEASURED
 
         /** The name of a body part, 1 to 24; "background" for 0. */
-        fun partName(part: Int): String = Native.partName(part)
+        fun partName(part: Int): String = textAt(Native.maq_densepose_get_part_name(part))
 
         /** The colour that the part is painted with in Maquette's pictures, opaque ARGB; transparent for 0. */
-        fun partColour(part: Int): Int = if (part in 1..24) Native.partColour(part) or (0xFF shl 24) else 0
+        fun partColour(part: Int): Int {
+            if (part !in 1..24) return 0
+            val rgb = Memory(3).also { Native.maq_densepose_get_part_colour(part, it) }.bytes(0, 3)
+            return rgb.fold(0xFF) { colour, channel -> colour shl 8 or (channel.toInt() and 0xFF) }
+        }
     }
 }
 
@@ -134,23 +140,23 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
 data class Person(val left: Float, val top: Float, val right: Float, val bottom: Float, val score: Float)
 
 /** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
-class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Unit = Native::releaseResult) :
+class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Unit = Native::maq_densepose_result_release) :
     AutoCloseable {
     internal val handle = Handle(this, pointer, release)
 
     /** What is known of each pixel. */
-    enum class Plane {
+    enum class Plane(internal val code: Int) {
         /** Body part 1 to 24, 0 for background. */
-        PART,
+        PART(MAQ_DENSEPOSE_PLANE_PART),
 
         /** U * 255. */
-        U,
+        U(MAQ_DENSEPOSE_PLANE_U),
 
         /** V * 255. */
-        V,
+        V(MAQ_DENSEPOSE_PLANE_V),
 
         /** Index of the person in [people] plus 1, 0 for background. */
-        PERSON,
+        PERSON(MAQ_DENSEPOSE_PLANE_PERSON),
     }
 
     /** Milliseconds of the stages, and counts. */
@@ -182,11 +188,18 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
     val people: List<Person>
 
     init {
-        val (width, height) = handle.use(Native::sizeOfResult)
+        val (width, height) = handle.use { pairOf { width, height -> Native.maq_densepose_result_get_size(it, width, height) } }
         widthPx = width
         heightPx = height
-        people = handle.use(Native::peopleOfResult).toList().chunked(5)
-            .map { (left, top, right, bottom, score) -> Person(left, top, right, bottom, score) }
+        people =
+            List(handle.use(Native::maq_densepose_result_get_person_count)) { index ->
+                val person =
+                    handle.read(maq_densepose_person()) { it, person ->
+                        Native.maq_densepose_result_get_person(it, index, person)
+                    }
+                val (left, top, right, bottom) = person.box_px
+                Person(left, top, right, bottom, person.score)
+            }
     }
 
     /**
@@ -196,21 +209,27 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for another index.
      */
     fun headBox(person: Int): HeadBox? =
-        handle.use { Native.headBoxOfResult(it, person) }
-            ?.let { (left, top, right, bottom) -> HeadBox(left, top, right, bottom) }
+        orNull(Status.NOT_FOUND) {
+            val box = Memory(4 * Float.SIZE_BYTES)
+            handle.use { Native.maq_densepose_result_get_head_box(it, person, box) }
+            val (left, top, right, bottom) = box.floats(0, 4)
+            HeadBox(left, top, right, bottom)
+        }
 
     /**
      * A plane as it lies in native memory, [heightPx] rows of [widthPx] bytes, read-only and without a copy. It must
      * not be read after the result has been closed: [copyPlane] gives what stays.
      */
     fun plane(plane: Plane): ByteBuffer =
-        handle.use { Native.planeOfResult(it, plane.ordinal + 1).asReadOnlyBuffer() }
+        handle.use {
+            planeOf(widthPx, heightPx) { pixels, stride ->
+                Native.maq_densepose_result_get_plane(it, plane.code, pixels, stride)
+            }
+        }
 
     /** Copies a plane, [heightPx] rows of [widthPx] bytes. */
     fun copyPlane(plane: Plane): ByteArray =
-        handle.use { result ->
-            ByteArray(widthPx * heightPx).also { Native.planeOfResult(result, plane.ordinal + 1).get(it) }
-        }
+        handle.use { ByteArray(widthPx * heightPx).also { values -> plane(plane).get(values) } }
 
     /**
      * A picture of the frame's size to draw over it: each pixel of a person in the colour of its part
@@ -246,7 +265,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
 
     private fun draw(onto: Any, isBitmap: Boolean, frame: Frame?, opacity: Int) {
         require(opacity in 0..255) { "The opacity is $opacity; it must be 0 to 255." }
-        val draw = { below: Long -> handle.use { NativePicture.drawResult(it, below, opacity, onto, isBitmap) } }
+        val draw = { below: Long -> handle.use { Android.drawResult(it, below, opacity, onto, isBitmap) } }
         if (frame == null) draw(0) else frame.handle.use(draw)
     }
 
@@ -258,18 +277,17 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a path that ends with "/"), [Status.UNSUPPORTED] (an
      *   older Android) and [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { Native.saveResult(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_densepose_result_save(it, textOf(path)) }
 
     /** Of the run that gave the result. */
     val stats: Stats
         get() {
-            val s = handle.use(Native::statsOfResult)
-            val counts = s.drop(8).map(Double::toLong)
-            val (width, height, proposals, found, crops) = counts.map(Long::toInt)
+            val s = handle.read(maq_densepose_stats(), Native::maq_densepose_result_get_stats)
             return Stats(
-                s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], width, height, proposals, found, crops,
-                counts[5].toInt(), counts[6], counts[7], counts[8] != 0L,
-                DensePose.Provider.entries[counts[9].toInt()], counts[10].toInt(), counts[11] != 0L,
+                s.preprocess_ms, s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms,
+                s.total_ms, s.network_width_px, s.network_height_px, s.proposal_count, s.person_count, s.crop_count,
+                s.dropped_box_count, s.body_pixel_count, s.clamped_pixel_count, s.is_key_frame != 0,
+                DensePose.Provider.of(s.provider), s.threads, s.is_threads_measured != 0,
             )
         }
 

@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeEdges
+import dev.maquette.jni.*
 
 /**
  * The sharp feature curves of a depth frame, the corners in which they meet, and boxes. Found by
@@ -8,7 +8,7 @@ import dev.maquette.jni.NativeEdges
  * y down, z along the optical axis.
  */
 class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeEdges::releaseCurves)
+    private val handle = Handle(this, pointer, Native::maq_edges_curves_release)
 
     /**
      * Settings of the curve search. The defaults suit all cameras and scenes, because lengths are in pixels.
@@ -30,37 +30,37 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
         val minLengthPx: Float = 10f,
         val skipBoxes: Boolean = false,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                voteRadiusPx.toDouble(),
-                minVotes.toDouble(),
-                flyingPixelBandPx.toDouble(),
-                fitBandPx.toDouble(),
-                splitAngleDegrees.toDouble(),
-                minLengthPx.toDouble(),
-                if (skipBoxes) 1.0 else 0.0,
-            )
+        internal fun native() =
+            maq_edges_curves_config().also {
+                it.vote_radius_px = voteRadiusPx
+                it.min_votes = minVotes
+                it.flying_pixel_band_px = flyingPixelBandPx
+                it.fit_band_px = fitBandPx
+                it.split_angle_deg = splitAngleDegrees
+                it.min_length_px = minLengthPx
+                it.skip_boxes = skipBoxes.toInt()
+            }
     }
 
-    enum class Type {
-        LINE,
+    enum class Type(internal val code: Int) {
+        LINE(MAQ_EDGES_CURVE_LINE),
 
         /** A circular arc or a whole circle. */
-        ARC,
+        ARC(MAQ_EDGES_CURVE_ARC),
 
         /** A cubic B-spline. */
-        SPLINE,
+        SPLINE(MAQ_EDGES_CURVE_SPLINE),
     }
 
     /** The convexity of a crease, seen from the camera's side. */
-    enum class Convexity {
-        UNKNOWN,
+    enum class Convexity(internal val code: Int) {
+        UNKNOWN(MAQ_EDGES_CONVEXITY_UNKNOWN),
 
         /** Like the edge of a box. */
-        CONVEX,
+        CONVEX(MAQ_EDGES_CONVEXITY_CONVEX),
 
         /** Like the edge between a wall and the floor. */
-        CONCAVE,
+        CONCAVE(MAQ_EDGES_CONVEXITY_CONCAVE),
     }
 
     /**
@@ -99,7 +99,12 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     )
 
     /** What a pointer can snap to. */
-    enum class Target { NOTHING, CORNER, CURVE, PLANE }
+    enum class Target(internal val code: Int) {
+        NOTHING(MAQ_EDGES_SNAP_NOTHING),
+        CORNER(MAQ_EDGES_SNAP_CORNER),
+        CURVE(MAQ_EDGES_SNAP_CURVE),
+        PLANE(MAQ_EDGES_SNAP_PLANE),
+    }
 
     /**
      * The target at a pixel.
@@ -121,16 +126,12 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     val boxesMs: Double
 
     init {
-        val counts = handle.use(NativeEdges::countsOfCurves)
-        val (curveCount, cornerCount, boxCount) = counts.take(3).map(Double::toInt)
-        curves = List(curveCount) { index -> curveOf(handle.use { NativeEdges.curve(it, index) }) }
-        corners = List(cornerCount) { index ->
-            val c = handle.use { NativeEdges.corner(it, index) }
-            Corner(pointAt(c, 1), c[0].toInt())
-        }
-        boxes = List(boxCount) { index -> boxOf(handle.use { NativeEdges.box(it, index) }) }
-        curvesMs = counts[3]
-        boxesMs = counts[4]
+        curves = List(handle.use(Native::maq_edges_curves_get_curve_count), ::curveAt)
+        corners = List(handle.use(Native::maq_edges_curves_get_corner_count), ::cornerAt)
+        boxes = List(handle.use(Native::maq_edges_curves_get_box_count), ::boxAt)
+        val stats = handle.read(maq_edges_curves_stats(), Native::maq_edges_curves_get_stats)
+        curvesMs = stats.curves_ms
+        boxesMs = stats.boxes_ms
     }
 
     /**
@@ -140,8 +141,9 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a radius that is not 0 to 1e6.
      */
     fun snap(xPx: Double, yPx: Double, radiusPx: Double = 8.0): Snap {
-        val s = handle.use { NativeEdges.snap(it, xPx, yPx, radiusPx) }
-        return Snap(Target.entries[s[0].toInt()], s[1].toInt(), pointAt(s, 3), s[6])
+        val s = maq_edges_snap()
+        handle.use { Native.maq_edges_curves_snap_to_pixel(it, xPx, yPx, radiusPx, s) }
+        return Snap(Target.entries.first { it.code == s.target }, s.index, Point3.of(s.point_m), s.distance_px)
     }
 
     /**
@@ -150,18 +152,28 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension) and [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { NativeEdges.saveCurves(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_edges_curves_save(it, textOf(path)) }
 
     override fun close() = handle.close()
 
-    private fun curveOf(c: DoubleArray) =
-        Curve(
-            Type.entries[c[0].toInt()], EdgesResult.Kind.entries[c[1].toInt()], Convexity.entries[c[2].toInt()], c[3] != 0.0,
-            c[4].toInt(), c[5].toInt(), c[6], c[7], List((c.size - 8) / 3) { pointAt(c, 8 + 3 * it) },
+    private fun curveAt(index: Int): Curve {
+        val c = handle.read(maq_edges_curve()) { it, curve -> Native.maq_edges_curves_get_curve(it, index, curve) }
+        return Curve(
+            Type.entries.first { it.code == c.type },
+            EdgesResult.Kind.entries.first { it.code == c.kind },
+            Convexity.entries.first { it.code == c.convexity },
+            c.is_closed != 0, c.corners[0], c.corners[1], c.length_m, c.rms_footprints,
+            c.points_m.doubles(3 * c.point_count).toList().chunked(3, Point3::of),
         )
+    }
 
-    private fun boxOf(b: DoubleArray) =
-        Box(b[0].toInt(), b.slice(1..3), b.slice(4..6), List(3) { pointAt(b, 7 + 3 * it) }, pointAt(b, 16))
+    private fun cornerAt(index: Int): Corner {
+        val c = handle.read(maq_edges_corner()) { it, corner -> Native.maq_edges_curves_get_corner(it, index, corner) }
+        return Corner(Point3.of(c.point_m), c.curve_count)
+    }
 
-    private fun pointAt(v: DoubleArray, index: Int) = Point3(v[index], v[index + 1], v[index + 2])
+    private fun boxAt(index: Int): Box {
+        val b = handle.read(maq_edges_box()) { it, box -> Native.maq_edges_curves_get_box(it, index, box) }
+        return Box(b.corner_count, b.size_m, b.size_tolerance_m, b.axes.chunked(3, Point3::of), Point3.of(b.centre_m))
+    }
 }

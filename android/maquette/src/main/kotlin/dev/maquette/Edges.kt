@@ -1,8 +1,7 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeEdges
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
-import java.nio.ByteOrder
 import java.nio.FloatBuffer
 
 /**
@@ -15,7 +14,7 @@ import java.nio.FloatBuffer
  * ```
  */
 class Edges internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeEdges::destroy)
+    private val handle = Handle(this, pointer, Native::maq_edges_destroy)
 
     /**
      * @property threads as of [DensePose.Config].
@@ -34,15 +33,13 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
         val skipPlanes: Boolean = false,
         val averageFrames: Int = 0,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                threads.toDouble(),
-                resultPoolSize.toDouble(),
-                if (allowSpinning) 1.0 else 0.0,
-                provider.ordinal.toDouble(),
-                if (skipPlanes) 1.0 else 0.0,
-                averageFrames.toDouble(),
-            )
+        internal fun native(bundle: ModelBundle) =
+            maq_edges_config().also {
+                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.result_pool_size = resultPoolSize
+                it.skip_planes = skipPlanes.toInt()
+                it.average_frames = averageFrames
+            }
     }
 
     /**
@@ -55,39 +52,39 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
      *   results are open, and [Status.CANCELLED] after [cancel].
      */
     fun run(frame: Frame): EdgesResult =
-        handle.use { edges -> frame.handle.use { EdgesResult(NativeEdges.run(edges, it)) } }
+        handle.use { edges -> frame.handle.use { EdgesResult(Native.maq_edges_run(edges, it)) } }
 
     /** Cancels the running [run], or else the next one; from any thread. */
-    fun cancel() = handle.use(NativeEdges::cancel)
+    fun cancel() = handle.use(Native::maq_edges_cancel)
 
     override fun close() = handle.close()
 }
 
 /** For each pixel of a depth frame, how far its point is from the nearest sharp edge. */
 class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeEdges::releaseResult)
+    private val handle = Handle(this, pointer, Native::maq_edges_result_release)
 
     /** The planes of floats. */
     enum class Plane(internal val code: Int) {
         /** Distance to the nearest edge, in footprints (depth / focal length); [epsR]: no edge is nearer. */
-        DISTANCE(1),
+        DISTANCE(MAQ_EDGES_PLANE_DISTANCE),
 
         /** Predicted mean absolute error of the distance, in footprints. */
-        EXPECTED_ERROR(2),
+        EXPECTED_ERROR(MAQ_EDGES_PLANE_EXPECTED_ERROR),
 
         /** The frame's depth in metres; 0 where it is unknown. */
-        DEPTH(4),
+        DEPTH(MAQ_EDGES_PLANE_DEPTH),
     }
 
     /** The kind of a pixel's nearest edge. */
-    enum class Kind {
-        NONE,
+    enum class Kind(internal val code: Int) {
+        NONE(MAQ_EDGES_KIND_NONE),
 
         /** Two surfaces meet, and both are visible. */
-        CREASE,
+        CREASE(MAQ_EDGES_KIND_CREASE),
 
         /** The surface ends here and hides its other side. */
-        BOUNDARY,
+        BOUNDARY(MAQ_EDGES_KIND_BOUNDARY),
     }
 
     /** Milliseconds of the stages, and counts of pixels. */
@@ -116,9 +113,9 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
     val heightPx: Int get() = intrinsics.heightPx
 
     init {
-        val field = handle.use(NativeEdges::fieldOfResult)
-        epsR = field[0]
-        intrinsics = Intrinsics.of(field.copyOfRange(1, field.size))
+        val field = handle.read(maq_edges_field(), Native::maq_edges_result_get_field)
+        epsR = field.eps_r.toDouble()
+        intrinsics = Intrinsics.of(field.intrinsics)
     }
 
     /**
@@ -133,14 +130,18 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
 
     /** Copies the ordinals of [Kind], [heightPx] rows of [widthPx] values. */
     fun copyKinds(): ByteArray =
-        handle.use { ByteArray(widthPx * heightPx).also { values -> bytes(KINDS, 1).get(values) } }
+        handle.use { ByteArray(widthPx * heightPx).also { values -> bytes(MAQ_EDGES_PLANE_KIND, 1).get(values) } }
 
     private fun bytes(plane: Int, valueBytes: Int): ByteBuffer =
-        handle.use { NativeEdges.planeOfResult(it, plane, valueBytes).asReadOnlyBuffer().order(ByteOrder.nativeOrder()) }
+        handle.use {
+            planeOf(widthPx * valueBytes, heightPx) { values, stride ->
+                Native.maq_edges_result_get_plane(it, plane, values, stride)
+            }
+        }
 
     /** Finds curves, corners and boxes. Takes some milliseconds. They outlive the result. */
     fun findCurves(config: EdgeCurves.Config = EdgeCurves.Config()): EdgeCurves =
-        handle.use { EdgeCurves(NativeEdges.findCurves(it, config.values())) }
+        handle.use { EdgeCurves(Native.maq_edges_result_find_curves(it, config.native())) }
 
     /**
      * Writes `<path>_distance.png`, `<path>_kind.png` and `<path>_edges.json`, atomically, into a folder that exists.
@@ -148,22 +149,18 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (an empty path, or a folder) and [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { NativeEdges.saveResult(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_edges_result_save(it, textOf(path)) }
 
     /** Times and counts of the run. */
     val stats: Stats
         get() {
-            val s = handle.use(NativeEdges::statsOfResult)
+            val s = handle.read(maq_edges_stats(), Native::maq_edges_result_get_stats)
             return Stats(
-                s[0], s[1], s[2], s[3], s[4], s[5], s[6].toLong(), s[7].toLong(), s[8].toLong(),
-                DensePose.Provider.entries[s[9].toInt()], s[10].toInt(), s[11] != 0.0,
-                s[12].toLong(),
+                s.depth_ms, s.skip_ms, s.slopes_ms, s.network_ms, s.decode_ms, s.total_ms, s.known_pixel_count,
+                s.network_pixel_count, s.broken_pixel_count, DensePose.Provider.of(s.provider), s.threads,
+                s.is_threads_measured != 0, s.averaged_pixel_count,
             )
         }
 
     override fun close() = handle.close()
-
-    private companion object {
-        const val KINDS = 3
-    }
 }

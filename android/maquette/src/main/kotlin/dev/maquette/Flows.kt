@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.Changes
 import java.util.concurrent.atomic.AtomicReference
 import kotlinx.coroutines.Dispatchers
 import kotlinx.coroutines.channels.Channel

@@ -2,27 +2,39 @@ package dev.maquette
 
 import android.graphics.Bitmap
 import android.hardware.HardwareBuffer
-import dev.maquette.jni.Native
-import dev.maquette.jni.NativePicture
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
+import java.nio.ByteOrder
 
 /** Rows from top to bottom, 8 bits a channel but for depth. */
 enum class PixelFormat(internal val code: Int) {
-    RGB8(1),
-    BGR8(2),
-    RGBA8(3),
-    GREY8(4),
+    RGB8(MAQ_PIXEL_RGB8),
+    BGR8(MAQ_PIXEL_BGR8),
+    RGBA8(MAQ_PIXEL_RGBA8),
+    GREY8(MAQ_PIXEL_GREY8),
 
     /** Planes Y, and U and V in turns at half the size; BT.601, video range. */
-    NV12(5),
-    YUYV(6),
+    NV12(MAQ_PIXEL_NV12),
+    YUYV(MAQ_PIXEL_YUYV),
 
     /** uint16 a pixel: millimetres, 0 where nothing is known. */
-    DEPTH16(7),
+    DEPTH16(MAQ_PIXEL_DEPTH16),
 
     /** float a pixel: metres; unknown where it is 0, negative, infinite or NaN. */
-    DEPTH32F(8),
+    DEPTH32F(MAQ_PIXEL_DEPTH32F),
     ;
+
+    internal fun rows(plane: Int, heightPx: Int): Int = if (plane == 1) (heightPx + 1) / 2 else heightPx
+
+    internal fun rowBytes(plane: Int, widthPx: Int): Long =
+        when (this) {
+            RGB8, BGR8 -> 3L * widthPx
+            RGBA8, DEPTH32F -> 4L * widthPx
+            GREY8 -> widthPx.toLong()
+            NV12 -> if (plane == 0) widthPx.toLong() else (widthPx + 1L) / 2 * 2
+            YUYV -> (widthPx + 1L) / 2 * 4
+            DEPTH16 -> 2L * widthPx
+        }
 
     internal companion object {
         fun of(code: Int) = entries.first { it.code == code }
@@ -32,10 +44,10 @@ enum class PixelFormat(internal val code: Int) {
 /** The zero of a timestamp. */
 enum class Clock(internal val code: Int) {
     /** The start of the file. */
-    MEDIA(1),
+    MEDIA(MAQ_CLOCK_MEDIA),
 
     /** `System.nanoTime()`. */
-    MONOTONIC(2),
+    MONOTONIC(MAQ_CLOCK_MONOTONIC),
     ;
 
     internal companion object {
@@ -47,21 +59,25 @@ enum class Clock(internal val code: Int) {
 class Plane(val pixels: ByteBuffer, val strideBytes: Int = 0)
 
 /** An image with its time. Made by [Maquette]; not changed afterwards. */
-class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native::releaseFrame) : AutoCloseable {
+class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native::maq_frame_release) : AutoCloseable {
     internal val handle = Handle(this, pointer, release)
-    private val description = handle.use(Native::describeFrame)
+    private val description = handle.read(maq_frame_desc(), Native::maq_frame_get_desc)
 
-    val widthPx: Int get() = description[0].toInt()
-    val heightPx: Int get() = description[1].toInt()
-    val format: PixelFormat get() = PixelFormat.of(description[2].toInt())
-    val clock: Clock get() = Clock.of(description[3].toInt())
-    val timestampNs: Long get() = description[4]
+    val widthPx: Int get() = description.width_px
+    val heightPx: Int get() = description.height_px
+    val format: PixelFormat get() = PixelFormat.of(description.format)
+    val clock: Clock get() = Clock.of(description.clock)
+    val timestampNs: Long get() = description.timestamp_ns
 
     /** Its number in its source, from 0. */
-    val sequence: Long get() = description[5]
+    val sequence: Long get() = description.sequence
 
     /** How its camera maps directions to pixels; null if that is unknown. Frames of a calibrated [Source] have it. */
-    val intrinsics: Intrinsics? get() = handle.use(Native::intrinsicsOfFrame)?.let(Intrinsics::of)
+    val intrinsics: Intrinsics?
+        get() {
+            val native = handle.read(maq_frame_desc(), Native::maq_frame_get_desc).intrinsics
+            return if (native.width_px == 0) null else Intrinsics.of(native)
+        }
 
     /**
      * The captured frame that a predicted frame was made from.
@@ -84,13 +100,17 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
      * pixels do not say so.
      */
     val origin: Origin?
-        get() = handle.use(Native::originOfFrame)?.let { o -> Origin(o[0], o[1], o[2], o[3]) }
+        get() {
+            val o = handle.read(maq_frame_origin(), Native::maq_frame_get_origin)
+            if (o.kind == MAQ_FRAME_CAPTURED) return null
+            return Origin(o.horizon_ns, o.age_ns, o.captured_timestamp_ns, o.captured_sequence)
+        }
 
     /** Copies the pixels into a direct buffer as RGB8, BGR8, RGBA8 or GREY8, rows without padding. */
     fun copyPixels(
         format: PixelFormat,
         into: ByteBuffer,
-    ) = handle.use { Native.copyFramePixels(it, format.code, into) }
+    ) = handle.use { Native.maq_frame_copy_pixels(it, format.code, Memory(into), 0, into.capacity().toLong()) }
 
     /** A copy as an ARGB_8888 bitmap. */
     fun toBitmap(): Bitmap = Bitmap.createBitmap(widthPx, heightPx, Bitmap.Config.ARGB_8888).also(::copyTo)
@@ -102,7 +122,7 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
      */
     fun copyTo(bitmap: Bitmap) {
         requireDrawable(bitmap)
-        handle.use { NativePicture.copyFrame(it, bitmap, true) }
+        handle.use { Android.copyFrame(it, bitmap, true) }
     }
 
     /**
@@ -112,24 +132,26 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
      */
     fun copyTo(buffer: HardwareBuffer) {
         requireOpen(buffer)
-        handle.use { NativePicture.copyFrame(it, buffer, false) }
+        handle.use { Android.copyFrame(it, buffer, false) }
     }
 
     /** A copy in another size, as BGR8. */
     fun resize(
         widthPx: Int,
         heightPx: Int,
-    ): Frame = handle.use { Frame(Native.resizeFrame(it, widthPx, heightPx)) }
+    ): Frame = handle.use { Frame(Native.maq_frame_resize(it, widthPx, heightPx)) }
 
     /**
      * A copy of the frame's depth: of its own pixels, or of the depth image that came with the picture; null if it has
      * none.
      */
-    fun copyDepth(): DepthImage? {
-        val size = IntArray(2)
-        val metres = handle.use { Native.depthOfFrame(it, size) } ?: return null
-        return DepthImage(size[0], size[1], metres)
-    }
+    fun copyDepth(): DepthImage? =
+        orNull(Status.UNSUPPORTED) {
+            handle.use { frame ->
+                val depth = maq_frame_desc().also { Native.maq_frame_get_depth(frame, it) }
+                DepthImage(depth.width_px, depth.height_px, metresOf(depth))
+            }
+        }
 
     /**
      * Writes the picture to a file in the format of its extension, PNG (.png) or JPEG (.jpg), atomically, in a folder
@@ -138,13 +160,37 @@ class Frame internal constructor(pointer: Long, release: (Long) -> Unit = Native
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension), [Status.UNSUPPORTED] (a depth
      *   image, an older Android) and [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { Native.saveFrame(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_frame_save(it, textOf(path)) }
 
     override fun close() = handle.close()
 }
 
 /** [heightPx] rows of [widthPx] depths along the optical axis, in metres; 0 where it is unknown. */
 class DepthImage(val widthPx: Int, val heightPx: Int, val metres: FloatArray)
+
+/** The C API cannot see how long a buffer is. */
+internal fun requireRows(plane: Plane, rows: Int, rowBytes: Long) {
+    if (rows < 1 || rowBytes < 0) return // the C API says so
+    val stride = if (plane.strideBytes == 0) rowBytes else plane.strideBytes.toLong()
+    val needed = (rows - 1) * stride + rowBytes
+    if (stride >= 0 && needed <= plane.pixels.capacity()) return
+    val problem = "A plane needs $needed bytes, but its buffer has ${plane.pixels.capacity()}."
+    throw MaquetteException(Status.INVALID_ARGUMENT, problem)
+}
+
+private fun metresOf(depth: maq_frame_desc): FloatArray {
+    val stride = depth.stride_bytes[0].toInt()
+    val rows = depth.planes[0].bytes(stride.toLong() * depth.height_px)
+    return FloatArray(depth.width_px * depth.height_px) { k ->
+        val (row, column) = k / depth.width_px to k % depth.width_px
+        if (depth.format == MAQ_PIXEL_DEPTH32F) {
+            rows.getFloat(row * stride + 4 * column).takeIf { it.isFinite() && it > 0 } ?: 0f
+        } else {
+            val millimetres = rows.getShort(row * stride + 2 * column).toInt() and 0xFFFF
+            if (millimetres == 0xFFFF) 0f else millimetres * 0.001f
+        }
+    }
+}
 
 internal fun requireDrawable(bitmap: Bitmap) {
     require(bitmap.isMutable) { "The bitmap is not mutable; make it with Bitmap.createBitmap or copy it." }

@@ -1,5 +1,6 @@
 package dev.maquette
 
+import dev.maquette.jni.*
 import java.lang.ref.PhantomReference
 import java.lang.ref.ReferenceQueue
 import java.util.Collections
@@ -36,6 +37,9 @@ internal class Handle(owner: Any, private val pointer: Long, private val release
         }
     }
 
+    /** Returns [struct], filled by [get]. */
+    fun <S : Memory> read(struct: S, get: (Long, Memory?) -> Unit): S = struct.also { use { native -> get(native, it) } }
+
     override fun close() {
         if (!isClosed.compareAndSet(false, true)) return
         Forgotten.leave(whenForgotten)
@@ -54,6 +58,25 @@ internal class Handle(owner: Any, private val pointer: Long, private val release
 
     private fun endUse() {
         if (uses.decrementAndGet() == 0) release(pointer)
+    }
+}
+
+/**
+ * The handle of an object of [this] that tells [changes] its changes of state. [create] gets the number of these as the
+ * callback's user data.
+ */
+internal fun Any.handleWithCallback(changes: Changes<*>, destroy: (Long) -> Unit, create: (id: Long) -> Long): Handle {
+    val id = Callbacks.keep(changes)
+    val pointer =
+        try {
+            create(id)
+        } catch (error: MaquetteException) {
+            Callbacks.release(id)
+            throw error
+        }
+    return Handle(this, pointer) {
+        destroy(it) // from now on it tells nothing
+        Callbacks.release(id)
     }
 }
 

@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeHead
+import dev.maquette.jni.*
 
 /**
  * A 3D head, coloured and in metres. Made by [HeadBuilder.fit] and [Maquette.openHead]; shown by a [HeadRenderer]. Points
@@ -8,18 +8,18 @@ import dev.maquette.jni.NativeHead
  * a texture has the face's pixels. All functions may be called from any thread.
  */
 class Head internal constructor(pointer: Long) : AutoCloseable {
-    internal val handle = Handle(this, pointer, NativeHead::destroy)
+    internal val handle = Handle(this, pointer, Native::maq_head_destroy)
 
     /** Where the size of a head comes from. */
-    enum class Scale {
+    enum class Scale(internal val code: Int) {
         /** The average of heads: photos alone do not tell the size. */
-        PRIOR,
+        PRIOR(MAQ_HEAD_SCALE_PRIOR),
 
         /** A known distance. */
-        GIVEN,
+        GIVEN(MAQ_HEAD_SCALE_GIVEN),
 
         /** A depth camera. */
-        DEPTH,
+        DEPTH(MAQ_HEAD_SCALE_DEPTH),
     }
 
     /**
@@ -55,15 +55,21 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     val cameras: List<PinholeCamera>
 
     init {
-        val i = handle.use(NativeHead::info)
-        info = Info(i[0].toInt(), Scale.entries[i[2].toInt()], i[3], i[4].toInt())
+        val i = handle.read(maq_head_info(), Native::maq_head_get_info)
+        info = Info(i.photo_count, Scale.entries.first { it.code == i.scale }, i.scale_sigma.toDouble(), i.texture_px)
         landmarks =
-            List(i[1].toInt()) { index ->
-                val name = handle.use { NativeHead.landmarkName(it, index) }
-                val l = handle.use { NativeHead.landmark(it, name) }
-                name.decodeToString() to Landmark(Point3(l[0], l[1], l[2]), l[3])
+            List(i.landmark_count) { index ->
+                val name = textAt(handle.use { Native.maq_head_get_landmark_name(it, index) })
+                val l = maq_head_landmark()
+                handle.use { Native.maq_head_get_landmark(it, textOf(name), l) }
+                name to Landmark(Point3.of(l.point_m), l.sigma_m.toDouble())
             }.toMap()
-        cameras = List(info.photos) { index -> PinholeCamera.of(handle.use { NativeHead.camera(it, index) }) }
+        cameras =
+            List(info.photos) { index ->
+                val camera = maq_pinhole_camera()
+                handle.use { Native.maq_head_get_camera(it, index, camera) }
+                PinholeCamera.of(camera)
+            }
     }
 
     /**
@@ -74,7 +80,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
      *   has no such landmark).
      */
     fun scaledByDistance(from: String, to: String, distanceM: Double): Head =
-        handle.use { Head(NativeHead.scaleByDistance(it, from.toByteArray(), to.toByteArray(), distanceM)) }
+        handle.use { Head(Native.maq_head_scale_by_distance(it, textOf(from), textOf(to), distanceM)) }
 
     /**
      * Copies the head with the size at which it fits a depth image. Takes some 100 ms, so not on the main thread.
@@ -86,7 +92,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
      *   photo's) and [Status.NOT_FOUND] (half of the head has no depth that agrees with it).
      */
     fun scaledByDepth(depth: Frame, camera: Int = 0): Head =
-        handle.use { head -> depth.handle.use { frame -> Head(NativeHead.scaleByDepth(head, camera, frame)) } }
+        handle.use { head -> depth.handle.use { frame -> Head(Native.maq_head_scale_by_depth(head, camera, frame)) } }
 
     /**
      * Makes a mesh of its surface, which stays when the head is closed. Takes a second or less with the defaults, so not on
@@ -97,10 +103,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
      *   [Status.OUT_OF_MEMORY].
      */
     fun mesh(config: HeadMesh.Config = HeadMesh.Config()): HeadMesh =
-        handle.use { head ->
-            val bundle = config.bundle
-            HeadMesh(NativeHead.createMesh(head, config.values(), bundle?.folder, bundle?.names, bundle?.buffers))
-        }
+        handle.use { head -> HeadMesh(Native.maq_head_mesh_create(head, config.native())) }
 
     /**
      * Writes the head to a file (.maqh), some 64 KB and the texture, atomically, in a folder that exists. Blocks until it is
@@ -108,7 +111,7 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
      *
      * @throws MaquetteException with [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { NativeHead.save(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_head_save(it, textOf(path)) }
 
     /** Its meshes and their renderers stay usable. */
     override fun close() = handle.close()

@@ -1,23 +1,11 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeHead
+import dev.maquette.jni.*
 
 /** Receives the head as far as it is fitted, on the thread that fits, which waits meanwhile. */
 fun interface HeadPreview {
     /** @param head the preview's, to be closed by it. */
     fun onPreview(head: Head)
-}
-
-/** Called by native code, by its names. */
-internal class HeadCallbacks(private val progress: Progress?, private val preview: HeadPreview?) {
-    @Suppress("unused")
-    fun onProgress(done: Double, stage: ByteArray): Boolean =
-        progress?.onProgress(done, stage.decodeToString()) ?: true
-
-    @Suppress("unused")
-    fun onPreview(head: Long) {
-        preview?.onPreview(Head(head))
-    }
 }
 
 /** The box of a head with its hair, in pixels of the photo; right and bottom are exclusive. */
@@ -37,18 +25,18 @@ data class HeadBox(val left: Float, val top: Float, val right: Float, val bottom
  * Functions may be called from any thread, one at a time but for [cancel]; they take long, so not on the main thread.
  */
 class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeHead::destroyBuilder)
+    private val handle = Handle(this, pointer, Native::maq_head_builder_destroy)
 
     /** Whether heads get a texture. */
-    enum class Texture {
+    enum class Texture(internal val code: Int) {
         /** The SDK's choice: [OFF] in this version. */
-        DEFAULT,
+        DEFAULT(MAQ_HEAD_TEXTURE_DEFAULT),
 
         /** Heads have colours of the network alone, and hold no part of a photo. */
-        OFF,
+        OFF(MAQ_HEAD_TEXTURE_OFF),
 
         /** The photos' pixels where they see the surface well, the network's colours elsewhere. */
-        ON,
+        ON(MAQ_HEAD_TEXTURE_ON),
     }
 
     /**
@@ -70,16 +58,15 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         val mirrorUnseen: Boolean = false,
         val delightTexture: Boolean = false,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                threads.toDouble(),
-                if (allowSpinning) 1.0 else 0.0,
-                provider.ordinal.toDouble(),
-                texture.ordinal.toDouble(),
-                texturePx.toDouble(),
-                if (mirrorUnseen) 1.0 else 0.0,
-                if (delightTexture) 1.0 else 0.0,
-            )
+        internal fun native(bundle: ModelBundle) =
+            maq_head_builder_config().also {
+                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.texture = texture.code
+                it.texture_px = texturePx
+                it.mirror_unseen = mirrorUnseen.toInt()
+                it.delight_texture = delightTexture.toInt()
+                it.progress_callback = Addresses.ofProgressCallback()
+            }
     }
 
     /**
@@ -122,22 +109,24 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     /** What was found in each photo, in the order of [addPhoto]. */
     val photos: List<Photo>
         get() =
-            handle.use { builder ->
-                List(NativeHead.builderStats(builder)[0].toInt()) { index ->
-                    val p = NativeHead.photo(builder, index)
-                    Photo(HeadBox(p[0], p[1], p[2], p[3]), p[4], p[5] != 0f, p[6], p[7])
-                }
+            List(nativeStats().photo_count) { index ->
+                val p =
+                    handle.read(maq_head_photo_info()) { it, info -> Native.maq_head_builder_get_photo(it, index, info) }
+                val (left, top, right, bottom) = p.box_px
+                Photo(HeadBox(left, top, right, bottom), p.head_coverage, p.is_used != 0, p.focal_px, p.rms_px)
             }
 
     /** As it is now. */
     val stats: Stats
         get() {
-            val s = handle.use(NativeHead::builderStats)
+            val s = nativeStats()
             return Stats(
-                s[0].toInt(), s[1].toInt(), s[2], s[3], s[4], s[5], s[6].toInt(),
-                DensePose.Provider.entries[s[7].toInt()], s[8].toInt(),
+                s.photo_count, s.used_photo_count, s.encode_ms, s.pose_ms, s.fit_ms, s.total_ms, s.step_count,
+                DensePose.Provider.of(s.provider), s.threads,
             )
         }
+
+    private fun nativeStats() = handle.read(maq_head_build_stats(), Native::maq_head_builder_get_stats)
 
     /**
      * Encodes a photo of the head, of any format but depth, which may be closed afterwards. Several must be of one
@@ -161,8 +150,13 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         require(box != HeadBox(0f, 0f, 0f, 0f)) { "The box is empty; give the head's, or null to detect it." }
         require(focalPx != 0f) { "The focal length is 0; give the camera's, or null to have it estimated." }
         val (left, top, right, bottom) = box ?: HeadBox(0f, 0f, 0f, 0f)
-        val hints = floatArrayOf(left, top, right, bottom, rollRad, focalPx ?: 0f)
-        handle.use { builder -> photo.handle.use { NativeHead.addPhoto(builder, it, hints) } }
+        val known =
+            maq_head_photo().also {
+                it.box_px = listOf(left, top, right, bottom)
+                it.roll_rad = rollRad
+                it.focal_px = focalPx ?: 0f
+            }
+        handle.use { builder -> photo.handle.use { Native.maq_head_builder_add_photo(builder, it, known) } }
     }
 
     /**
@@ -172,10 +166,10 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.UNSUPPORTED] (a head of another bundle, or from a file of version 1),
      *   [Status.INVALID_ARGUMENT] (more than 192 photos).
      */
-    fun addHead(head: Head) = handle.use { builder -> head.handle.use { NativeHead.addHead(builder, it) } }
+    fun addHead(head: Head) = handle.use { builder -> head.handle.use { Native.maq_head_builder_add_head(builder, it) } }
 
     /** Forgets the photos and the prior head, so that another person's head can be fitted. */
-    fun clear() = handle.use(NativeHead::clear)
+    fun clear() = handle.use(Native::maq_head_builder_clear)
 
     /**
      * Fits one head to the photos so far. The first stage finds cameras and a shape in milliseconds; with [seconds] 0 that
@@ -195,13 +189,18 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         progress: Progress? = null,
     ): Head =
         handle.use { builder ->
-            Head(
-                NativeHead.fit(builder, seconds, HeadCallbacks(progress, preview), preview != null, previewIntervalS),
-            )
+            Callbacks.during(progress, preview, discard = Head::close) {
+                if (preview == null) {
+                    Native.maq_head_builder_set_preview(builder, 0.0, 0, 0)
+                } else {
+                    Native.maq_head_builder_set_preview(builder, previewIntervalS, Addresses.ofPreviewCallback(), 0)
+                }
+                Head(Native.maq_head_builder_fit(builder, seconds))
+            }
         }
 
     /** Ends the running [addPhoto] or [fit], or else the next one; from any thread. Does not block. */
-    fun cancel() = handle.use(NativeHead::cancel)
+    fun cancel() = handle.use(Native::maq_head_builder_cancel)
 
     /** Its heads stay valid. */
     override fun close() = handle.close()

@@ -1,22 +1,22 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeHead
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 import java.nio.FloatBuffer
 import java.nio.IntBuffer
 
 /** Which vertices and triangles the mesh of a head has. */
-enum class HeadTopology {
+enum class HeadTopology(internal val code: Int) {
     /** The surface itself, closed. */
-    FIELD,
+    FIELD(MAQ_HEAD_TOPOLOGY_FIELD),
 
     /**
      * The template head, registered to the surface: the same vertices for every head, with texture coordinates, eyeballs,
      * teeth, tongue, and morph targets for facial actions. It is open at the neck; hair, beards and glasses are as coarse
      * as skin.
      */
-    TEMPLATE,
+    TEMPLATE(MAQ_HEAD_TOPOLOGY_TEMPLATE),
 }
 
 /**
@@ -27,7 +27,7 @@ enum class HeadTopology {
  * appear twice.
  */
 class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
-    internal val handle = Handle(this, pointer, NativeHead::destroyMesh)
+    internal val handle = Handle(this, pointer, Native::maq_head_mesh_destroy)
 
     /**
      * How fine a mesh is, and which vertices it has. 0 means the default.
@@ -49,11 +49,17 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
             require(triangleCount >= ALL_TRIANGLES) { "The mesh has $triangleCount triangles; it needs 100 or more." }
         }
 
-        internal fun values() = doubleArrayOf(triangleCount.toDouble(), cellM, topology.ordinal.toDouble())
+        internal fun native() =
+            maq_head_mesh_config().also {
+                bundle?.writeTo(it.model)
+                it.triangle_count = triangleCount
+                it.cell_m = cellM
+                it.topology = topology.code
+            }
 
         companion object {
             /** For [triangleCount]. */
-            const val ALL_TRIANGLES = -1
+            const val ALL_TRIANGLES = MAQ_HEAD_ALL_TRIANGLES
         }
     }
 
@@ -77,22 +83,37 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
     )
 
     private val arrays: Arrays by lazy {
-        val errorM = FloatArray(1)
-        val all = handle.use { NativeHead.meshArrays(it, errorM) }
-        val (positions, normals, colours, templatePoints, triangles) = all
-        val (coordinates, texture, targets) = all.drop(5)
-        Arrays(
-            listOf(positions, normals, templatePoints, coordinates).map { it as ByteBuffer? },
-            colours as ByteBuffer,
-            triangles as ByteBuffer,
-            texture as ByteArray?,
-            (targets as Array<*>).map { target ->
-                val (name, vertices, deltas) = target as Array<*>
-                MorphTarget((name as ByteArray).decodeToString(), vertices as IntArray, deltas as FloatArray)
-            },
-            errorM[0],
-        )
+        handle.use { mesh ->
+            val data = maq_head_mesh_data().also { Native.maq_head_mesh_get_data(mesh, it) }
+            fun ofVertices(values: Pointer, bytes: Int) = copyOf(values.bytesOrNull(bytes.toLong() * data.vertex_count))
+            val point = 3 * Float.SIZE_BYTES
+            Arrays(
+                floats = listOf(
+                    ofVertices(data.positions_m, point),
+                    ofVertices(data.normals, point),
+                    ofVertices(data.template_points_m, point),
+                    ofVertices(data.texture_coordinates, 2 * Float.SIZE_BYTES),
+                ),
+                colours = ofVertices(data.colours_rgb, 3)!!,
+                triangles = copyOf(data.triangles.bytes(3L * Int.SIZE_BYTES * data.triangle_count))!!,
+                textureJpeg =
+                    data.texture_jpeg.bytesOrNull(data.texture_bytes.toLong())?.let { file ->
+                        ByteArray(data.texture_bytes).also(file::get)
+                    },
+                morphTargets = List(data.morph_target_count) { index -> morphTargetOf(mesh, index) },
+                simplificationErrorM = data.simplification_error_m,
+            )
+        }
     }
+
+    private fun morphTargetOf(mesh: Long, index: Int): MorphTarget {
+        val target = maq_head_morph_target().also { Native.maq_head_mesh_get_morph_target(mesh, index, it) }
+        val vertices = IntArray(target.vertex_count)
+        target.vertices.bytes(4L * vertices.size).asIntBuffer().get(vertices)
+        return MorphTarget(target.name.text(), vertices, target.deltas_m.floats(3 * vertices.size))
+    }
+
+    private fun copyOf(values: ByteBuffer?) = values?.let { native -> ByteBuffer.allocateDirect(native.capacity()).also { it.duplicate().put(native) } }
 
     val vertexCount: Int get() = arrays.colours.capacity() / 3
     val triangleCount: Int get() = arrays.triangles.capacity() / (3 * Int.SIZE_BYTES)
@@ -140,7 +161,7 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension) and [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { NativeHead.saveMesh(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_head_mesh_save(it, textOf(path)) }
 
     /** Its renderers stay usable. */
     override fun close() = handle.close()

@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeHead
+import dev.maquette.jni.*
 
 /**
  * Renders the mesh of a head from any camera. Made by [Maquette.headRenderer]; the mesh may be closed.
@@ -13,26 +13,26 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
     private val handle =
         Handle(
             this,
-            mesh.handle.use { NativeHead.createRenderer(context, it, config.values()) },
-            NativeHead::destroyRenderer,
+            mesh.handle.use { Native.maq_head_renderer_create(context, config.native(), it) },
+            Native::maq_head_renderer_destroy,
         )
 
     /** What the colours of an image show. */
-    enum class Shading {
+    enum class Shading(internal val code: Int) {
         /** The mesh's texture, or its colours if it has none; in soft light. */
-        COLOUR,
+        COLOUR(MAQ_HEAD_SHADING_COLOUR),
 
         /** Grey, in soft light. */
-        SHAPE,
+        SHAPE(MAQ_HEAD_SHADING_SHAPE),
 
         /** Red to the right, green up, blue to the camera, as in normal maps. */
-        NORMALS,
+        NORMALS(MAQ_HEAD_SHADING_NORMALS),
 
         /** Template points: red to the person's left, green to the back, blue up. */
-        TEMPLATE,
+        TEMPLATE(MAQ_HEAD_SHADING_TEMPLATE),
 
         /** White is near, black is far. */
-        DEPTH,
+        DEPTH(MAQ_HEAD_SHADING_DEPTH),
     }
 
     /**
@@ -54,25 +54,21 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
         val background: Int? = null,
         val imagePoolSize: Int = 0,
     ) {
-        internal fun values(): DoubleArray {
-            val rgb = background ?: 0
-            return doubleArrayOf(
-                threads.toDouble(),
-                nearM,
-                shading.ordinal.toDouble(),
-                shadingStrength.toDouble(),
-                if (disableAntialiasing) 1.0 else 0.0,
-                if (background != null) 1.0 else 0.0,
-                (rgb shr 16 and 0xFF).toDouble(),
-                (rgb shr 8 and 0xFF).toDouble(),
-                (rgb and 0xFF).toDouble(),
-                imagePoolSize.toDouble(),
-            )
-        }
+        internal fun native() =
+            maq_head_renderer_config().also {
+                it.threads = threads
+                it.near_m = nearM
+                it.shading = shading.code
+                it.shading_strength = shadingStrength
+                it.disable_antialiasing = disableAntialiasing.toInt()
+                it.use_background = (background != null).toInt()
+                it.background = rgbOf(background)
+                it.image_pool_size = imagePoolSize
+            }
 
         companion object {
             /** For [shadingStrength]: colours are shown without light. */
-            const val SHADING_STRENGTH_OFF = -1f
+            const val SHADING_STRENGTH_OFF = MAQ_HEAD_SHADING_STRENGTH_OFF.toFloat()
         }
     }
 
@@ -89,10 +85,14 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
         widthPx: Int = 640,
         heightPx: Int = 480,
     ): PinholeCamera =
-        PinholeCamera.of(handle.use { NativeHead.orbitCamera(it, yawRad, pitchRad, widthPx, heightPx) })
+        PinholeCamera.of(
+            handle.read(maq_pinhole_camera()) { it, camera ->
+                Native.maq_head_renderer_get_camera(it, yawRad, pitchRad, widthPx, heightPx, camera)
+            },
+        )
 
     /** Sets the shading of later images; not while [run] runs. */
-    fun setShading(shading: Shading) = handle.use { NativeHead.setShading(it, shading.ordinal) }
+    fun setShading(shading: Shading) = handle.use { Native.maq_head_renderer_set_shading(it, shading.code) }
 
     /**
      * Renders the view of a camera, in its size. Takes milliseconds, so not on the main thread; one call at a time.
@@ -103,7 +103,7 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
      *   [Status.POOL_EMPTY] while [Config.imagePoolSize] images are open, [Status.OUT_OF_MEMORY].
      */
     fun run(camera: PinholeCamera): RenderedImage =
-        RenderedImage(handle.use { NativeHead.render(it, camera.values()) })
+        RenderedImage(handle.use { Native.maq_head_renderer_run(it, camera.native()) })
 
     /** Images that are open stay valid. */
     override fun close() = handle.close()

@@ -8,7 +8,7 @@ import android.util.AttributeSet
 import android.util.Log
 import android.view.SurfaceHolder
 import android.view.SurfaceView
-import dev.maquette.jni.NativePreview
+import dev.maquette.jni.Android
 import java.util.concurrent.CountDownLatch
 import kotlin.concurrent.thread
 
@@ -48,7 +48,7 @@ class LiveView @JvmOverloads constructor(
             field = value
         }
 
-    private val preview = Handle(this, NativePreview.create(), NativePreview::destroy)
+    private val preview = Handle(this, Android.createPreview(), Android::destroyPreview)
     private var showing: Showing? = null
 
     /** View.post would wait until the view has a window. */
@@ -97,11 +97,11 @@ class LiveView @JvmOverloads constructor(
         width: Int,
         height: Int,
     ) {
-        preview.use { NativePreview.setSurface(it, holder.surface, width, height) }
+        preview.use { Android.setSurface(it, holder.surface, width, height) }
         showing?.draw()
     }
 
-    override fun surfaceDestroyed(holder: SurfaceHolder) = preview.use { NativePreview.setSurface(it, null, 0, 0) }
+    override fun surfaceDestroyed(holder: SurfaceHolder) = preview.use { Android.setSurface(it, null, 0, 0) }
 
     /** A pipeline that is shown, and its thread. */
     private inner class Showing(
@@ -136,7 +136,7 @@ class LiveView @JvmOverloads constructor(
                 preview.use { preview ->
                     result.frame.handle.use { frame ->
                         result.densePose.handle.use {
-                            NativePreview.draw(preview, frame, it, scaling == Scaling.FILL, opacity, isMirrored)
+                            Android.drawOnSurface(preview, frame, it, scaling == Scaling.FILL, opacity, isMirrored)
                         }
                     }
                 }

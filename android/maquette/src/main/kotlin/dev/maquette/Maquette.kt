@@ -5,12 +5,7 @@ import android.graphics.Bitmap
 import android.graphics.ImageFormat
 import android.hardware.HardwareBuffer
 import android.media.Image
-import dev.maquette.jni.Native
-import dev.maquette.jni.NativeEdges
-import dev.maquette.jni.NativeHead
-import dev.maquette.jni.NativePicture
-import dev.maquette.jni.NativePrediction
-import dev.maquette.jni.NativeScene
+import dev.maquette.jni.*
 import java.io.IOException
 import java.nio.ByteBuffer
 
@@ -35,15 +30,33 @@ import java.nio.ByteBuffer
  */
 class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = null) : AutoCloseable {
     private val handle =
-        Handle(this, Native.createContext(logLevel.ordinal, onnxRuntime?.toByteArray()), Native::destroyContext)
+        Handle(
+            this,
+            Native.maq_context_create(
+                MAQ_HEADER_VERSION,
+                maq_context_config().also {
+                    it.log_level = logLevel.code
+                    it.log_callback = Addresses.ofLogCallback()
+                    it.onnxruntime_library.set(onnxRuntime?.let(::textOf))
+                },
+            ),
+            Native::maq_context_destroy,
+        )
 
     /** The version of the ONNX Runtime library in use. The first call opens it. */
-    val onnxRuntimeVersion: String get() = handle.use(Native::onnxRuntimeVersion)
+    val onnxRuntimeVersion: String
+        get() {
+            val version = Memory(Long.SIZE_BYTES)
+            return handle.use { context ->
+                Native.maq_context_get_onnxruntime(context, version, null)
+                Pointer(version).text()
+            }
+        }
 
     /** A copy of a bitmap as a frame. Its configuration must be ARGB_8888. */
     fun frame(bitmap: Bitmap, timestampNs: Long = 0): Frame {
         require(bitmap.config == Bitmap.Config.ARGB_8888) { "The bitmap is ${bitmap.config}; ARGB_8888 is needed." }
-        return handle.use { Frame(NativePicture.frameOfBitmap(it, bitmap, timestampNs)) }
+        return handle.use { Frame(Android.frameOfBitmap(it, bitmap, timestampNs)) }
     }
 
     /**
@@ -65,22 +78,30 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         intrinsics: Intrinsics? = null,
     ): Frame =
         handle.use { context ->
-            Frame(
-                Native.wrapFrame(
-                    context,
-                    format.code,
-                    widthPx,
-                    heightPx,
-                    first.pixels,
-                    first.strideBytes,
-                    second?.pixels,
-                    second?.strideBytes ?: 0,
-                    timestampNs,
-                    clock.code,
-                    sequence,
-                    intrinsics?.values(),
-                ),
-            )
+            val planes = listOfNotNull(first, second.takeIf { format == PixelFormat.NV12 })
+            val desc =
+                maq_frame_desc().also { desc ->
+                    desc.format = format.code
+                    desc.width_px = widthPx
+                    desc.height_px = heightPx
+                    desc.timestamp_ns = timestampNs
+                    desc.clock = clock.code
+                    desc.sequence = sequence
+                    intrinsics?.writeTo(desc.intrinsics)
+                    planes.forEachIndexed { index, plane ->
+                        val rowBytes = format.rowBytes(index, widthPx)
+                        requireRows(plane, format.rows(index, heightPx), rowBytes)
+                        desc.planes[index].set(Memory(plane.pixels))
+                    }
+                    desc.stride_bytes = planes.map { it.strideBytes.toLong() }
+                }
+            val id = Callbacks.keep(planes) // until the frame has been released
+            try {
+                Frame(Native.maq_frame_wrap(context, desc, Addresses.ofReleaseCallback(), id))
+            } catch (error: MaquetteException) {
+                Callbacks.release(id)
+                throw error
+            }
         }
 
     /**
@@ -104,25 +125,15 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     ): Frame {
         val format = image.format
         require(format == ImageFormat.YUV_420_888) { "The image has format $format; YUV_420_888 is needed." }
+        val native = yuvImage(image.timestamp, clock, sequence, isFullRange, rotationDegrees)
+        native.width_px = image.width
+        native.height_px = image.height
         val planes = image.planes
-        val buffers = Array(3) { planes[it].buffer }
-        val strides = IntArray(6) { if (it % 2 == 0) planes[it / 2].rowStride else planes[it / 2].pixelStride }
-        return handle.use { context ->
-            Frame(
-                Native.frameOfImage(
-                    context,
-                    image.width,
-                    image.height,
-                    buffers,
-                    strides,
-                    isFullRange,
-                    rotationDegrees,
-                    image.timestamp,
-                    clock.code,
-                    sequence,
-                ),
-            )
-        }
+        planes.zip(native.planes) { from, to -> to.set(Memory(from.buffer)) }
+        native.size_bytes = planes.map { it.buffer.capacity().toLong() }
+        native.stride_bytes = planes.map { it.rowStride }
+        native.pixel_stride_bytes = planes.map { it.pixelStride }
+        return handle.use { Frame(Native.maq_frame_convert_yuv(it, native)) }
     }
 
     /**
@@ -148,19 +159,22 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         rotationDegrees: Int = 0,
     ): Frame {
         requireOpen(buffer)
-        return handle.use { context ->
-            Frame(
-                NativePicture.frameOfBuffer(
-                    context,
-                    buffer,
-                    isFullRange,
-                    rotationDegrees,
-                    timestampNs,
-                    clock.code,
-                    sequence,
-                ),
-            )
-        }
+        val like = yuvImage(timestampNs, clock, sequence, isFullRange, rotationDegrees)
+        return handle.use { Frame(Android.frameOfBuffer(it, buffer, like)) }
+    }
+
+    private fun yuvImage(
+        timestampNs: Long,
+        clock: Clock,
+        sequence: Long,
+        isFullRange: Boolean,
+        rotationDegrees: Int,
+    ) = maq_yuv_image().also {
+        it.timestamp_ns = timestampNs
+        it.clock = clock.code
+        it.sequence = sequence
+        it.is_video_range = (!isFullRange).toInt()
+        it.rotation_deg = rotationDegrees
     }
 
     /**
@@ -173,21 +187,19 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     fun decode(file: ByteArray): Frame {
         val data = ByteBuffer.allocateDirect(maxOf(file.size, 1))
         data.put(file)
-        return handle.use { Frame(Native.decodeFrame(it, data, file.size)) }
+        return handle.use { Frame(Native.maq_frame_decode(it, Memory(data), file.size.toLong())) }
     }
 
     /** Loads the networks of dense pose; takes some 100 ms, so not on the main thread. */
     fun densePose(bundle: ModelBundle, config: DensePose.Config = DensePose.Config()): DensePose =
         handle.use { context ->
-            DensePose(
-                Native.createDensePose(context, bundle.folder, bundle.names, bundle.buffers, config.values()),
-            )
+            DensePose(Native.maq_densepose_create(context, config.native(bundle)))
         }
 
     /** Loads the network of edges; takes some 10 ms, so not on the main thread. */
     fun edges(bundle: ModelBundle, config: Edges.Config = Edges.Config()): Edges =
         handle.use { context ->
-            Edges(NativeEdges.create(context, bundle.folder, bundle.names, bundle.buffers, config.values()))
+            Edges(Native.maq_edges_create(context, config.native(bundle)))
         }
 
     /**
@@ -240,10 +252,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
 
     private fun predictor(config: Predictor.Config, bundle: ModelBundle?): Predictor =
         handle.use { context ->
-            val (folder, names, buffers) = Triple(bundle?.folder, bundle?.names, bundle?.buffers)
-            Predictor(
-                NativePrediction.createPredictor(context, folder, names, buffers, config.values(), config.seed),
-            )
+            Predictor(Native.maq_predictor_create(context, config.native(bundle)))
         }
 
     /**
@@ -335,11 +344,11 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      *   [Status.UNSUPPORTED] (another version).
      */
     fun openScene(path: String): Scene =
-        handle.use { context -> Scene(NativeScene.open(context, path.toByteArray()), null) }
+        handle.use { context -> Scene(Native.maq_scene_open(context, textOf(path)), null) }
 
     /** Opens a scene file in a direct buffer, from its start to its capacity; it is copied. Fails as for a path. */
     fun openScene(file: ByteBuffer): Scene =
-        handle.use { context -> Scene(NativeScene.openMemory(context, file), null) }
+        handle.use { Scene(Native.maq_scene_open_memory(it, Memory(file), file.capacity().toLong()), null) }
 
     /**
      * Opens a scene file of the app's assets. Fails as for a path.
@@ -368,9 +377,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      */
     fun headBuilder(bundle: ModelBundle, config: HeadBuilder.Config = HeadBuilder.Config()): HeadBuilder =
         handle.use { context ->
-            HeadBuilder(
-                NativeHead.createBuilder(context, bundle.folder, bundle.names, bundle.buffers, config.values()),
-            )
+            HeadBuilder(Native.maq_head_builder_create(context, config.native(bundle)))
         }
 
     /**
@@ -379,10 +386,11 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
      * @throws MaquetteException with [Status.NOT_FOUND], [Status.UNREADABLE] (damaged, or not a head) and
      *   [Status.UNSUPPORTED] (another version).
      */
-    fun openHead(path: String): Head = handle.use { context -> Head(NativeHead.open(context, path.toByteArray())) }
+    fun openHead(path: String): Head = handle.use { context -> Head(Native.maq_head_open(context, textOf(path))) }
 
     /** Opens a head file in a direct buffer, from its start to its capacity; it is copied. Fails as for a path. */
-    fun openHead(file: ByteBuffer): Head = handle.use { context -> Head(NativeHead.openMemory(context, file)) }
+    fun openHead(file: ByteBuffer): Head = 
+        handle.use { Head(Native.maq_head_open_memory(it, Memory(file), file.capacity().toLong())) }
 
     /**
      * Opens a head file of the app's assets. Fails as for a path.
@@ -403,9 +411,15 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
 
     companion object {
         /** The version of the native library. */
-        val version: String get() = Native.version()
+        val version: String get() = textAt(Native.maq_get_sdk_version())
     }
 }
 
 /** How much is logged. */
-enum class LogLevel { OFF, ERROR, WARNING, INFO, DEBUG }
+enum class LogLevel(internal val code: Int) {
+    OFF(MAQ_LOG_OFF),
+    ERROR(MAQ_LOG_ERROR),
+    WARNING(MAQ_LOG_WARNING),
+    INFO(MAQ_LOG_INFO),
+    DEBUG(MAQ_LOG_DEBUG),
+}

@@ -1,6 +1,7 @@
 package dev.maquette
 
 import android.content.res.AssetManager
+import dev.maquette.jni.*
 import java.io.FileInputStream
 import java.io.IOException
 import java.nio.ByteBuffer
@@ -10,14 +11,29 @@ import java.nio.channels.FileChannel
  * Trained networks: the files of a folder with `manifest.json`. Buffers are copied by the call that takes the bundle. A
  * folder is read by that call too; a [Pipeline] reads it when it opens its first source.
  */
-class ModelBundle private constructor(folder: String?, files: Map<String, ByteBuffer>?) {
-    internal val folder = folder?.toByteArray()
-    internal val names = files?.keys?.map(String::toByteArray)?.toTypedArray()
-    internal val buffers = files?.values?.toTypedArray()
+class ModelBundle private constructor(private val folder: String?, private val files: Map<String, ByteBuffer>) {
+    internal fun writeTo(options: maq_model_options) {
+        options.bundle_path.set(folder?.let(::textOf))
+        if (files.isEmpty()) return
+        options.bundle_file_count = files.size
+        options.bundle_files.set(arrayOfFiles())
+    }
+
+    private fun arrayOfFiles(): Memory {
+        val fileBytes = maq_memory_file().sizeBytes
+        val array = Memory(files.size * fileBytes)
+        files.entries.forEachIndexed { index, (name, contents) ->
+            val file = maq_memory_file(array, index * fileBytes)
+            file.name.set(textOf(name))
+            file.data.set(Memory(contents))
+            file.size_bytes = contents.capacity().toLong()
+        }
+        return array
+    }
 
     companion object {
         /** A bundle in a folder of the file system. */
-        fun ofFolder(path: String) = ModelBundle(path, null)
+        fun ofFolder(path: String) = ModelBundle(path, emptyMap())
 
         /** A bundle in memory: direct buffers, by file name. */
         fun ofBuffers(files: Map<String, ByteBuffer>) = ModelBundle(null, files.toMap())
@@ -63,3 +79,21 @@ class ModelBundle private constructor(folder: String?, files: Map<String, ByteBu
             }
     }
 }
+
+/** Sets how networks are loaded and run; [bundle] null: without one. */
+internal fun maq_model_options.set(
+    bundle: ModelBundle?,
+    threads: Int = 0,
+    provider: DensePose.Provider = DensePose.Provider.CPU,
+    spinning: Int = MAQ_SPINNING_DEFAULT,
+) {
+    bundle?.writeTo(this)
+    this.threads = threads
+    this.provider = provider.code
+    this.spinning = spinning
+}
+
+internal fun spinning(isAllowed: Boolean) = if (isAllowed) MAQ_SPINNING_ON else MAQ_SPINNING_OFF
+
+/** Yes and no of the C API. */
+internal fun Boolean.toInt() = if (this) 1 else 0

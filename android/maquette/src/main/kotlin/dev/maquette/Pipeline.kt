@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativePipeline
+import dev.maquette.jni.*
 import java.util.concurrent.atomic.AtomicInteger
 
 /**
@@ -21,16 +21,14 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
 
     @Volatile private var model = modelOf(bundle, config.densePose)
     internal val stateChanges =
-        Changes { state, status, problem -> Change(State.entries[state], Status.of(status), problem) }
+        Changes { state, status, problem -> Change(State.of(state), Status.of(status), problem) }
             .also { it.tell(Change(State.STOPPED, Status.OK, "")) }
     private val handle =
-        Handle(
-            this,
-            context.use {
-                NativePipeline.create(it, config.source.values(), config.resultPoolSize, config.nice, stateChanges)
-            },
-            NativePipeline::destroy,
-        )
+        handleWithCallback(stateChanges, Native::maq_pipeline_destroy) { id ->
+            val native = config.native()
+            native.state_user_data = id
+            context.use { Native.maq_pipeline_create(it, native) }
+        }
 
     init {
         run(model)
@@ -52,36 +50,49 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
         val source: Source.Config = Source.Config(),
         val nice: Int = 0,
         val frameBudgetMs: Double = 0.0,
-    )
+    ) {
+        internal fun native() =
+            maq_pipeline_config().also {
+                it.result_pool_size = resultPoolSize
+                it.source.set(source.native())
+                it.nice = nice
+                it.state_callback = Addresses.ofPipelineCallback()
+            }
+    }
 
     /** What it does. */
-    enum class State {
+    enum class State(internal val code: Int) {
         /** It has no source: none was set yet, or [stop] was called. */
-        STOPPED,
+        STOPPED(MAQ_PIPELINE_STOPPED),
 
         /** The source is being opened. */
-        OPENING,
+        OPENING(MAQ_PIPELINE_OPENING),
 
         /** The networks are being loaded. */
-        LOADING,
+        LOADING(MAQ_PIPELINE_LOADING),
 
         /** Results are delivered. */
-        RUNNING,
+        RUNNING(MAQ_PIPELINE_RUNNING),
 
         /** By [setPaused]. */
-        PAUSED,
+        PAUSED(MAQ_PIPELINE_PAUSED),
 
         /** The camera sends no frames; it may recover by itself. */
-        STALLED,
+        STALLED(MAQ_PIPELINE_STALLED),
 
         /** The camera was lost; it is opened again if it comes back within [Source.Config.reconnectMs]. */
-        RECONNECTING,
+        RECONNECTING(MAQ_PIPELINE_RECONNECTING),
 
         /** The source has no more frames. */
-        ENDED,
+        ENDED(MAQ_PIPELINE_ENDED),
 
         /** The source or the networks cannot be used; [Info.problem] says why. */
-        FAILED,
+        FAILED(MAQ_PIPELINE_FAILED),
+        ;
+
+        internal companion object {
+            fun of(code: Int) = entries.first { it.code == code }
+        }
     }
 
     /** A new state. [status] and [problem] are as in [Info], at that time. */
@@ -118,20 +129,21 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
 
     /** As it is now. */
     val info: Info
-        get() {
-            val codes = IntArray(2)
-            val (problem, uri) = handle.use { NativePipeline.info(it, codes) }.map(ByteArray::decodeToString)
-            return Info(State.entries[codes[0]], Status.of(codes[1]), problem, uri)
-        }
+        get() =
+            handle.use { pipeline ->
+                val i = maq_pipeline_info().also { Native.maq_pipeline_get_info(pipeline, it) }
+                Info(State.of(i.state), Status.of(i.status), i.problem.text(), i.source_uri.text())
+            }
 
     /** As it is now. */
     val stats: Stats
         get() {
-            val s = handle.use(NativePipeline::stats)
-            val quality = withModel(NativePipeline::quality)
+            val s = handle.read(maq_pipeline_stats(), Native::maq_pipeline_get_stats)
+            val model = maq_densepose_model_stats()
+            withModel { Native.maq_densepose_model_get_stats(it, model) }
             return Stats(
-                s[0].toLong(), s[1].toLong(), s[2].toLong(), s[3], s[4], s[5], s[6].takeIf { it >= 0 },
-                quality[0], quality[1],
+                s.result_count, s.dropped_result_count, s.dropped_frame_count, s.results_per_second, s.wait_ms, s.run_ms,
+                s.age_ms.takeIf { it >= 0 }, model.key_frame_interval, model.long_side_px,
             )
         }
 
@@ -140,7 +152,7 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
      * call. After [State.FAILED] everything is tried again. [info] and [changes] tell what went wrong.
      */
     @Synchronized
-    fun setSource(uri: String) = handle.use { NativePipeline.setSource(it, uri.toByteArray()) }
+    fun setSource(uri: String) = handle.use { Native.maq_pipeline_set_source(it, textOf(uri)) }
 
     /**
      * Loads networks in place of the current ones; the source stays open, and a photo that was processed is processed
@@ -158,17 +170,14 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
     }
 
     private fun modelOf(bundle: ModelBundle, config: DensePose.Config): Handle {
-        val pointer =
-            context.use {
-                NativePipeline.createModel(it, bundle.folder, bundle.names, bundle.buffers, config.values())
-            }
-        return Handle(this, pointer, NativePipeline::destroyModel).also { made ->
-            made.use { NativePipeline.setFrameBudget(it, frameBudgetMs) }
-            made.use { NativePipeline.setRoll(it, rollRad) }
+        val pointer = context.use { Native.maq_densepose_model_create(it, config.native(bundle)) }
+        return Handle(this, pointer, Native::maq_model_destroy).also { made ->
+            made.use { Native.maq_densepose_model_set_frame_budget(it, frameBudgetMs) }
+            made.use { Native.maq_densepose_model_set_roll(it, rollRad) }
         }
     }
 
-    private fun run(next: Handle) = next.use { made -> handle.use { NativePipeline.setModel(it, made) } }
+    private fun run(next: Handle) = next.use { made -> handle.use { Native.maq_pipeline_set_model(it, made) } }
 
     private fun <T> withModel(work: (Long) -> T): T {
         while (true) {
@@ -183,29 +192,30 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
 
     /** [DensePose.setRoll] for the next frames, whatever the source and the model. */
     fun setRoll(rollRad: Float) {
-        withModel { NativePipeline.setRoll(it, rollRad) }
+        withModel { Native.maq_densepose_model_set_roll(it, rollRad) }
         this.rollRad = rollRad
     }
 
     /** Pauses or resumes. The current frame is finished first; the source stays open. */
-    fun setPaused(isPaused: Boolean) = handle.use { NativePipeline.setPaused(it, isPaused) }
+    fun setPaused(isPaused: Boolean) = handle.use { Native.maq_pipeline_set_paused(it, isPaused.toInt()) }
 
     /**
      * Records the frames that are processed from now on to a file (.maqrec, for the source `rec:`), which must not
      * exist yet. null, or the end or a change of the source, finishes the recording. If it fails, results go on, and [info]
      * has the reason.
      */
-    fun setRecording(path: String?) = handle.use { NativePipeline.setRecording(it, path?.toByteArray()) }
+    fun setRecording(path: String?) = handle.use { Native.maq_pipeline_set_recording(it, path?.let(::textOf)) }
 
     /** Closes the source; the networks stay loaded, and [setSource] starts again. A waiting [acquireResult] ends. */
     @Synchronized // so that the change to STOPPED does not follow one of a source that is set meanwhile
     fun stop() {
-        handle.use(NativePipeline::stop)
+        handle.use(Native::maq_pipeline_stop)
         stateChanges.tell(Change(State.STOPPED, Status.OK, "")) // the library tells nothing after a stop
     }
 
     /** As [DensePose.surface]; null also before the networks are loaded. A result tells that they are. */
-    fun surface(): BodySurface? = withModel(NativePipeline::surface)?.let(::BodySurface)
+    fun surface(): BodySurface? = 
+        withModel { model -> BodySurface.of { Native.maq_densepose_model_get_surface(model, it) } }
 
     /**
      * Takes the newest result that was not taken yet, or waits for the next: not on the main thread.
@@ -216,15 +226,17 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
      *   open; and with the status of [info] when the source or the networks cannot be used.
      */
     fun acquireResult(timeoutMs: Long = WAIT_FOREVER): PipelineResult? {
-        val objects = LongArray(4)
-        val times = DoubleArray(3)
-        if (!handle.use { NativePipeline.acquire(it, nanoseconds(timeoutMs), objects, times) }) return null
-        val (result, frame, densePose, number) = objects
+        val result =
+            orNull(Status.END_OF_STREAM, Status.CANCELLED) {
+                handle.use { Native.maq_pipeline_acquire_result(it, nanoseconds(timeoutMs)) }
+            } ?: return null
+        val s = maq_pipeline_result_stats().also { Native.maq_pipeline_result_get_stats(result, it) }
         val openParts = AtomicInteger(2)
-        val release = { _: Long -> if (openParts.decrementAndGet() == 0) NativePipeline.releaseResult(result) }
+        val release = { _: Long -> if (openParts.decrementAndGet() == 0) Native.maq_pipeline_result_release(result) }
         return PipelineResult(
-            Frame(frame, release), DensePoseResult(densePose, release), number, times[0], times[1],
-            times[2].takeIf { it >= 0 },
+            Frame(Native.maq_pipeline_result_get_frame(result), release),
+            DensePoseResult(Native.maq_pipeline_result_get_densepose(result), release),
+            s.number, s.wait_ms, s.run_ms, s.age_ms.takeIf { it >= 0 },
         )
     }
 
@@ -233,7 +245,7 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
      * thread. Results that are open stay valid.
      */
     override fun close() {
-        handle.closeAfter(NativePipeline::stop)
+        handle.closeAfter(Native::maq_pipeline_stop)
         model.close()
         stateChanges.end()
     }

@@ -1,6 +1,7 @@
 package dev.maquette
 
-import dev.maquette.jni.NativePrediction
+import dev.maquette.jni.*
+import java.util.concurrent.atomic.AtomicBoolean
 
 /**
  * Takes the frames of a stream and predicts later ones, to hide the delay between camera and screen. Made by
@@ -16,27 +17,27 @@ import dev.maquette.jni.NativePrediction
  * [Status.INVALID_ARGUMENT]. [cancel] may be called at any time.
  */
 class Predictor internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativePrediction::destroyPredictor)
+    internal val handle = Handle(this, pointer, Native::maq_predictor_destroy)
 
     /** How frames are predicted. */
-    enum class Method {
+    enum class Method(internal val code: Int) {
         /**
          * Blends the last frame and the motion prediction per cell, weighted by their errors on past frames at the same
          * horizon. Equals the last frame while these errors are unknown and while nothing moves.
          */
-        AUTO,
+        AUTO(MAQ_PREDICTOR_AUTO),
 
         /** Repeats the last frame. */
-        LAST,
+        LAST(MAQ_PREDICTOR_LAST),
 
         /** Moves everything on at the speed between the last two frames. */
-        MOTION,
+        MOTION(MAQ_PREDICTOR_MOTION),
 
         /** Refines [AUTO] by a network. Needs a bundle; not for a [Concealer]. */
-        REFINED,
+        REFINED(MAQ_PREDICTOR_REFINED),
 
         /** Samples one possible future by a transformer. Slow. Needs a bundle; not for a [Concealer]. */
-        SAMPLED,
+        SAMPLED(MAQ_PREDICTOR_SAMPLED),
     }
 
     /**
@@ -55,14 +56,15 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
         val topK: Int = 0,
         val seed: Long = 0,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                threads.toDouble(),
-                method.ordinal.toDouble(),
-                framePoolSize.toDouble(),
-                temperature.toDouble(),
-                topK.toDouble(),
-            )
+        internal fun native(bundle: ModelBundle?) =
+            maq_predictor_config().also {
+                it.model.set(bundle, threads)
+                it.method = method.code
+                it.frame_pool_size = framePoolSize
+                it.temperature = temperature
+                it.top_k = topK
+                it.seed = seed
+            }
     }
 
     /**
@@ -110,7 +112,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image).
      */
     fun push(frame: Frame) =
-        handle.use { predictor -> frame.handle.use { NativePrediction.pushToPredictor(predictor, it) } }
+        handle.use { predictor -> frame.handle.use { Native.maq_predictor_push(predictor, it) } }
 
     /**
      * Predicts the frame [aheadS] seconds, 0 to 10, after the newest one, in the same size and format. Its timestamp is
@@ -120,7 +122,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (also before the first frame), [Status.POOL_EMPTY] while
      *   [Config.framePoolSize] frames are open, and [Status.CANCELLED].
      */
-    fun predict(aheadS: Double): Frame = Frame(handle.use { NativePrediction.predict(it, aheadS) })
+    fun predict(aheadS: Double): Frame = Frame(handle.use { Native.maq_predictor_predict(it, aheadS) })
 
     /**
      * Samples [sampleCount], 1 to 16, possible futures of [frameCount], 1 to 64, frames that are [stepS], up to 0.125,
@@ -132,10 +134,10 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      *   method is not [Method.SAMPLED]) and [Status.CANCELLED].
      */
     fun sample(sampleCount: Int, frameCount: Int, stepS: Double) =
-        handle.use { NativePrediction.sample(it, sampleCount, frameCount, stepS) }
+        handle.use { Native.maq_predictor_sample(it, sampleCount, frameCount, stepS) }
 
     /** Cancels the sampling that runs, or else the next one: it throws [Status.CANCELLED]. Any thread. */
-    fun cancel() = handle.use(NativePrediction::cancelPredictor)
+    fun cancel() = handle.use(Native::maq_predictor_cancel)
 
     /**
      * Decodes frame [frameIndex] (1-based) of sample [sampleIndex] (0-based). Otherwise like [predict].
@@ -143,7 +145,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a frame that was not sampled, and [Status.POOL_EMPTY].
      */
     fun acquireSample(sampleIndex: Int, frameIndex: Int): Frame =
-        Frame(handle.use { NativePrediction.acquireSample(it, sampleIndex, frameIndex) })
+        Frame(handle.use { Native.maq_predictor_acquire_sample(it, sampleIndex, frameIndex) })
 
     /**
      * Returns the mean entropy of a code of that frame in bits, for 16 x 16 cells row by row.
@@ -151,18 +153,25 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a frame that was not sampled.
      */
     fun entropyMap(sampleIndex: Int, frameIndex: Int): FloatArray =
-        handle.use { NativePrediction.entropyMap(it, sampleIndex, frameIndex) }
+        handle.use { predictor ->
+            val stats = maq_predictor_stats().also { Native.maq_predictor_get_stats(predictor, it) }
+            val cells = maxOf(stats.cell_count, 1)
+            val bits = Memory(4 * cells)
+            Native.maq_predictor_copy_entropy_map(predictor, sampleIndex, frameIndex, bits, cells.toLong())
+            bits.floats(0, cells).toFloatArray()
+        }
 
     /** Forgets the frames so far, to begin another stream. */
-    fun reset() = handle.use(NativePrediction::resetPredictor)
+    fun reset() = handle.use(Native::maq_predictor_reset)
 
     /** Times and counts at this moment. */
     val stats: Stats
         get() {
-            val s = handle.use(NativePrediction::statsOfPredictor)
+            val s = handle.read(maq_predictor_stats(), Native::maq_predictor_get_stats)
             return Stats(
-                s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], Method.entries[s[8].toInt()], s[9], s[10].toLong(),
-                s[11].toLong(), s[12].toLong(), s[13].toInt(), s[14].toInt(),
+                s.luma_ms, s.flow_ms, s.weights_ms, s.push_ms, s.project_ms, s.warp_ms, s.predict_ms, s.networks_ms,
+                Method.entries.first { it.code == s.method }, s.motion_fraction.toDouble(), s.pushed_count,
+                s.predicted_count, s.reset_count, s.sampled_frame_count, s.step_count,
             )
         }
 
@@ -190,26 +199,22 @@ class Novelty internal constructor(
     private val handle: Handle
 
     init {
-        fun create(other: Long) =
-            NativePrediction.createNovelty(
-                context,
-                bundle?.folder,
-                bundle?.names,
-                bundle?.buffers,
-                config.values(),
-                other,
-            )
+        fun create(other: Long): Long {
+            val native = config.native(bundle)
+            native.shared_with = other
+            return Native.maq_novelty_create(context, native)
+        }
         val made = if (sharedWith == null) create(0) else sharedWith.handle.use(::create)
-        handle = Handle(this, made, NativePrediction::destroyNovelty)
+        handle = Handle(this, made, Native::maq_novelty_destroy)
     }
 
     /** The source of code probabilities. */
-    enum class Method {
+    enum class Method(internal val code: Int) {
         /** The bundle's transformer, which sees three past frames; without one, the bigram prior. */
-        AUTO,
+        AUTO(MAQ_NOVELTY_AUTO),
 
         /** The bigram prior: how often a code followed another in training. Takes about 0 ms. */
-        BIGRAM,
+        BIGRAM(MAQ_NOVELTY_BIGRAM),
     }
 
     /**
@@ -224,13 +229,12 @@ class Novelty internal constructor(
         val eventRatio: Float = 4f,
         val method: Method = Method.AUTO,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                threads.toDouble(),
-                if (allowSpinning) 1.0 else 0.0,
-                eventRatio.toDouble(),
-                method.ordinal.toDouble(),
-            )
+        internal fun native(bundle: ModelBundle?) =
+            maq_novelty_config().also {
+                it.model.set(bundle, threads, spinning = spinning(allowSpinning))
+                it.event_ratio = eventRatio
+                it.method = method.code
+            }
     }
 
     /**
@@ -288,11 +292,17 @@ class Novelty internal constructor(
      *
      * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image) and [Status.INFERENCE].
      */
-    fun push(frame: Frame): Score {
-        val s = handle.use { novelty -> frame.handle.use { NativePrediction.pushToNovelty(novelty, it) } }
-        val map = s.copyOfRange(SCALARS, s.size)
-        return Score(s[2], s[3], s[4] != 0f, s[5] != 0f, s[6] != 0f, s[0].toInt(), s[1].toInt(), map)
-    }
+    fun push(frame: Frame): Score =
+        handle.use { novelty ->
+            val s = maq_novelty_score()
+            frame.handle.use { Native.maq_novelty_push(novelty, it, s) }
+            val cells = s.columns * s.rows
+            val map = Memory(4 * cells).also { Native.maq_novelty_copy_map(novelty, it, cells.toLong()) }
+            Score(
+                s.bits, s.ratio, s.is_event != 0, s.is_cut != 0, s.is_stream_start != 0, s.columns, s.rows,
+                map.floats(0, cells).toFloatArray(),
+            )
+        }
 
     /**
      * Decodes the codes of the latest frame to a small square RGB image: the detail that the network kept. The time is
@@ -302,24 +312,23 @@ class Novelty internal constructor(
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] before the first frame, [Status.POOL_EMPTY],
      *   [Status.BAD_BUNDLE] and [Status.INFERENCE].
      */
-    fun reconstruction(): Frame = Frame(handle.use(NativePrediction::reconstruction))
+    fun reconstruction(): Frame = Frame(handle.use(Native::maq_novelty_acquire_reconstruction))
 
     /** Forgets the frames so far, to begin another stream. */
-    fun reset() = handle.use(NativePrediction::resetNovelty)
+    fun reset() = handle.use(Native::maq_novelty_reset)
 
     /** Times and counts at this moment. */
     val stats: Stats
         get() {
-            val s = handle.use(NativePrediction::statsOfNovelty)
-            return Stats(s[0], s[1], s[2], s[3], s[4], s[5].toInt(), s[6].toLong(), s[7].toLong(), s[8].toLong())
+            val s = handle.read(maq_novelty_stats(), Native::maq_novelty_get_stats)
+            return Stats(
+                s.resize_ms, s.network_ms, s.nearest_ms, s.transformer_ms, s.push_ms, s.threads, s.pushed_count,
+                s.event_count, s.stream_start_count,
+            )
         }
 
     /** Its images, and streams that share its networks, stay valid. */
     override fun close() = handle.close()
-
-    private companion object {
-        const val SCALARS = 7
-    }
 }
 
 /**
@@ -341,12 +350,18 @@ class Novelty internal constructor(
  * [frames] gives the same as a flow.
  */
 class Concealer internal constructor(context: Long, source: Source, config: Config) : AutoCloseable {
-    private val handle =
-        Handle(
-            this,
-            source.handle.use { NativePrediction.createConcealer(context, it, source, config.values()) },
-            NativePrediction::destroyConcealer,
-        )
+    private val handle: Handle
+    private val isStopped = AtomicBoolean()
+
+    init {
+        val made = source.handle.use { Native.maq_concealer_create(context, it, config.native()) }
+        val id = Callbacks.keep(source) // the garbage collector would stop a source that the app has forgotten
+        handle =
+            Handle(this, made) {
+                Native.maq_concealer_destroy(it)
+                Callbacks.release(id)
+            }
+    }
 
     /**
      * @property maxGapMs the longest gap that is filled, 1 to 10000; 0: 300.
@@ -361,13 +376,13 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
         val method: Predictor.Method = Predictor.Method.AUTO,
         val framePoolSize: Int = 3,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                maxGapMs.toDouble(),
-                threads.toDouble(),
-                method.ordinal.toDouble(),
-                framePoolSize.toDouble(),
-            )
+        internal fun native() =
+            maq_concealer_config().also {
+                it.max_gap_ms = maxGapMs
+                it.threads = threads
+                it.method = method.code
+                it.frame_pool_size = framePoolSize
+            }
     }
 
     /**
@@ -403,17 +418,43 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
      *   [Config.framePoolSize] frames are open; [Status.INVALID_ARGUMENT] while another thread acquires a frame.
      */
     fun acquireFrame(timeoutMs: Long = WAIT_FOREVER): Frame? {
-        val frame = handle.use { NativePrediction.acquireFromConcealer(it, nanoseconds(timeoutMs)) }
-        return if (frame == 0L) null else Frame(frame)
+        val deadlineNs = if (timeoutMs < 0) Long.MAX_VALUE else System.nanoTime() + nanoseconds(timeoutMs)
+        return handle.use { concealer ->
+            while (!isStopped.get()) {
+                // Nothing else ends a wait than stopping the source.
+                val leftNs = if (timeoutMs < 0) SLICE_NS else (deadlineNs - System.nanoTime()).coerceIn(0, SLICE_NS)
+                try {
+                    return@use Frame(Native.maq_concealer_acquire_frame(concealer, leftNs))
+                } catch (error: MaquetteException) {
+                    when (error.status) {
+                        Status.END_OF_STREAM, Status.CANCELLED -> return@use null
+                        Status.TIMEOUT -> if (leftNs < SLICE_NS) throw timeout(timeoutMs)
+                        else -> throw error
+                    }
+                }
+            }
+            null
+        }
     }
+
+    private fun timeout(timeoutMs: Long) =
+        MaquetteException(Status.TIMEOUT, "No frame came within $timeoutMs ms.")
 
     /** Counts and times at this moment. */
     val stats: Stats
         get() {
-            val s = handle.use(NativePrediction::statsOfConcealer)
-            return Stats(s[0].toLong(), s[1].toLong(), s[2].toLong(), s[3].toLong(), s[4], s[5], s[6])
+            val s = handle.read(maq_concealer_stats(), Native::maq_concealer_get_stats)
+            return Stats(
+                s.captured_count, s.predicted_count, s.late_count, s.dropped_count, s.latest_gap_ms, s.latest_wait_ms,
+                s.max_wait_ms,
+            )
         }
 
     /** Gives the source's frames back to it. Frames that are open stay valid. Blocks for at most 50 ms. */
-    override fun close() = handle.closeAfter(NativePrediction::stopConcealer)
+    override fun close() = handle.closeAfter { isStopped.set(true) }
+
+    private companion object {
+        /** The longest time that a wait delays closing. */
+        const val SLICE_NS = 50_000_000L
+    }
 }

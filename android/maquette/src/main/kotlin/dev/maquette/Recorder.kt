@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeSource
+import dev.maquette.jni.*
 
 /**
  * Writes frames to a recording (.maqrec) with their times, depth and intrinsics; the source `rec:` plays it. Made by
@@ -26,10 +26,15 @@ class Recorder internal constructor(
     private val handle: Handle
 
     init {
+        val native =
+            maq_recorder_config().also {
+                it.jpeg_quality = jpegQuality
+                it.keep_predicted = keepPredicted.toInt()
+            }
         fun create(source: Long) =
-            NativeSource.createRecorder(context, path.toByteArray(), source, jpegQuality, keepPredicted)
+            Native.maq_recorder_create(context, textOf(path), source, native)
         val made = if (source == null) create(0) else source.handle.use(::create)
-        handle = Handle(this, made, NativeSource::destroyRecorder)
+        handle = Handle(this, made, Native::maq_recorder_destroy)
     }
 
     /** What has been written so far. */
@@ -38,8 +43,8 @@ class Recorder internal constructor(
     /** As it is now. */
     val info: Info
         get() {
-            val (frames, bytes) = handle.use(NativeSource::recorderInfo)
-            return Info(frames.toLong(), bytes.toLong())
+            val i = handle.read(maq_recorder_info(), Native::maq_recorder_get_info)
+            return Info(i.frame_count, i.size_bytes)
         }
 
     /**
@@ -49,14 +54,14 @@ class Recorder internal constructor(
      *   (predicted, and such are not kept) and [Status.UNWRITABLE] (no space: earlier frames stay readable, and frames
      *   can be added again once there is some).
      */
-    fun add(frame: Frame) = handle.use { recorder -> frame.handle.use { NativeSource.record(recorder, it) } }
+    fun add(frame: Frame) = handle.use { recorder -> frame.handle.use { Native.maq_recorder_add_frame(recorder, it) } }
 
     /**
      * Writes the index, without which a player has to search for the frames. Blocks until the file is on the disk.
      *
      * @throws MaquetteException with [Status.UNWRITABLE].
      */
-    fun finish() = handle.use(NativeSource::finishRecorder)
+    fun finish() = handle.use(Native::maq_recorder_finish)
 
     /** Without [finish] before, the index is missing, and a file without a frame is removed. */
     override fun close() = handle.close()

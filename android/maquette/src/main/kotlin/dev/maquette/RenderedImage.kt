@@ -1,42 +1,41 @@
 package dev.maquette
 
 import android.graphics.Bitmap
-import dev.maquette.jni.NativeImage
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
-import java.nio.ByteOrder
 
 /**
  * An image of a [HeadRenderer] or a [SceneRenderer], from a pool: close it soon. All functions may be called from any
  * thread.
  */
 class RenderedImage internal constructor(pointer: Long) : AutoCloseable {
-    private val handle = Handle(this, pointer, NativeImage::release)
+    private val handle = Handle(this, pointer, Native::maq_image_release)
 
     val widthPx: Int
     val heightPx: Int
 
     init {
-        val (width, height) = handle.use(NativeImage::size)
+        val (width, height) = handle.use { pairOf { width, height -> Native.maq_image_get_size(it, width, height) } }
         widthPx = width
         heightPx = height
     }
 
     /** The planes of an image; 0 where nothing is. */
-    enum class Plane(internal val pixelBytes: Int) {
+    enum class Plane(internal val code: Int, internal val pixelBytes: Int) {
         /** Three bytes a pixel: blue, green, red. */
-        BGR(3),
+        BGR(MAQ_IMAGE_PLANE_BGR, 3),
 
         /** A byte a pixel: coverage, 0 to 255. */
-        ALPHA(1),
+        ALPHA(MAQ_IMAGE_PLANE_ALPHA, 1),
 
         /** A float a pixel: depth along the optical axis, in metres for heads and in units of the scene for scenes. */
-        DEPTH(4),
+        DEPTH(MAQ_IMAGE_PLANE_DEPTH, 4),
 
         /** Heads only. Three floats a pixel: the outward normal in the camera (x right, y down, z forward), of length 1. */
-        NORMALS(12),
+        NORMALS(MAQ_IMAGE_PLANE_NORMALS, 12),
 
         /** Heads only. Three floats a pixel: the point of the template head, in metres. */
-        TEMPLATE_POINTS(12),
+        TEMPLATE_POINTS(MAQ_IMAGE_PLANE_TEMPLATE_POINTS, 12),
     }
 
     /**
@@ -70,8 +69,9 @@ class RenderedImage internal constructor(pointer: Long) : AutoCloseable {
      */
     fun plane(plane: Plane): ByteBuffer =
         handle.use {
-            NativeImage.plane(it, plane.ordinal + 1, plane.pixelBytes * widthPx, heightPx)
-                .asReadOnlyBuffer().order(ByteOrder.nativeOrder())
+            planeOf(plane.pixelBytes * widthPx, heightPx) { pixels, stride ->
+                Native.maq_image_get_plane(it, plane.code, pixels, stride)
+            }
         }
 
     /**
@@ -91,8 +91,11 @@ class RenderedImage internal constructor(pointer: Long) : AutoCloseable {
      */
     val sceneStats: SceneStats
         get() {
-            val s = handle.use(NativeImage::sceneStats)
-            return SceneStats(s[0], s[1], s[2], s[3], s[4], s[5].toInt(), s[6].toLong(), s[7].toLong(), s[8].toLong())
+            val s = handle.read(maq_scene_render_stats(), Native::maq_image_get_scene_stats)
+            return SceneStats(
+                s.project_ms, s.shade_ms, s.refine_ms, s.resample_ms, s.total_ms, s.drawn_block_count,
+                s.drawn_point_count, s.shaded_point_count, s.refined_pixel_count,
+            )
         }
 
     /**
@@ -105,7 +108,7 @@ class RenderedImage internal constructor(pointer: Long) : AutoCloseable {
      *   Bitmap.compress need none).
      */
     fun save(path: String, withAlpha: Boolean = false) =
-        handle.use { NativeImage.save(it, path.toByteArray(), if (withAlpha) 1 else 0) }
+        handle.use { Native.maq_image_save(it, textOf(path), if (withAlpha) MAQ_IMAGE_ALPHA_ON else MAQ_IMAGE_ALPHA_OFF) }
 
     override fun close() = handle.close()
 }

@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeScene
+import dev.maquette.jni.*
 
 /**
  * An environment that can be seen from new viewpoints with a [SceneRenderer]. Made by [Maquette.buildScene],
@@ -9,7 +9,7 @@ import dev.maquette.jni.NativeScene
  * @property buildStats how it was built; null if it was opened.
  */
 class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?) : AutoCloseable {
-    internal val handle = Handle(this, pointer, NativeScene::close)
+    internal val handle = Handle(this, pointer, Native::maq_scene_destroy)
 
     /**
      * A description of a scene.
@@ -34,14 +34,9 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
 
     /** Its description. */
     val info: Info =
-        handle.use { scene ->
-            val networks = ByteArray(32)
-            val i = NativeScene.info(scene, networks)
-            val (up, boundsMin, boundsMax) = i.drop(4).chunked(3)
-            Info(
-                i[0].toInt(), i[1].toLong(), i[2].toLong(), i[3].toLong(), up, boundsMin, boundsMax,
-                networks.joinToString("") { "%02x".format(it) },
-            )
+        with(handle.read(maq_scene_info(), Native::maq_scene_get_info)) {
+            val sha256 = networks_sha256.joinToString("") { "%02x".format(it) }
+            Info(coefficient_bits, point_count, view_dependent_count, block_count, up, bounds_min, bounds_max, sha256)
         }
 
     /**
@@ -49,10 +44,10 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
      *
      * @throws MaquetteException with [Status.UNWRITABLE].
      */
-    fun save(path: String) = handle.use { NativeScene.save(it, path.toByteArray()) }
+    fun save(path: String) = handle.use { Native.maq_scene_save(it, textOf(path)) }
 
     /** Writes positions and mean colours as a binary PLY file, for other programs; fails as [save]. */
-    fun savePly(path: String) = handle.use { NativeScene.savePly(it, path.toByteArray()) }
+    fun savePly(path: String) = handle.use { Native.maq_scene_save_ply(it, textOf(path)) }
 
     /** Its renderers stay usable. */
     override fun close() = handle.close()
@@ -65,19 +60,19 @@ class Scene internal constructor(pointer: Long, val buildStats: SceneBuildStats?
             config: SceneBuildConfig,
             progress: Progress?,
         ): Scene {
+            val native = config.native(bundle)
             val scene =
-                capture.handle.use {
-                    NativeScene.build(
-                        context,
-                        it,
-                        bundle.folder,
-                        bundle.names,
-                        bundle.buffers,
-                        config.values(),
-                        progress?.let(::NativeProgress),
-                    )
+                capture.handle.use { from ->
+                    Callbacks.during(progress, discard = Native::maq_scene_destroy) {
+                        Native.maq_scene_build(context, native, from)
+                    }
                 }
-            return Scene(scene, SceneBuildStats.of(NativeScene.buildStats(scene)))
+            return of(scene)
+        }
+
+        fun of(scene: Long): Scene {
+            val stats = maq_scene_build_stats().also { Native.maq_scene_get_build_stats(scene, it) }
+            return Scene(scene, SceneBuildStats.of(stats))
         }
     }
 }

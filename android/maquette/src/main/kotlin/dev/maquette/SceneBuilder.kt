@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeScene
+import dev.maquette.jni.*
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
 
@@ -33,26 +33,31 @@ data class SceneBuildConfig(
     val maxViews: Int = 0,
     val useHeldOut: Boolean = false,
 ) {
-    internal fun values() =
-        doubleArrayOf(
-            threads.toDouble(),
-            longSidePx.toDouble(),
-            coefficientBits.toDouble(),
-            minVariation,
-            visibilityScale,
-            nearDepth,
-            maxPoints.toDouble(),
-            maxMemoryBytes.toDouble(),
-            maxViews.toDouble(),
-            if (useHeldOut) 1.0 else 0.0,
-        )
+    internal fun native(bundle: ModelBundle): maq_scene_build_config {
+        if (maxPoints < 0 || maxMemoryBytes < 0) {
+            throw MaquetteException(Status.INVALID_ARGUMENT, "A size or a count is negative.")
+        }
+        return maq_scene_build_config().also {
+            it.model.set(bundle, threads)
+            it.long_side_px = longSidePx
+            it.coefficient_bits = coefficientBits
+            it.min_variation = minVariation
+            it.visibility_scale = visibilityScale
+            it.near_depth = nearDepth
+            it.max_points = maxPoints
+            it.max_memory_bytes = maxMemoryBytes
+            it.max_views = maxViews
+            it.use_held_out = useHeldOut.toInt()
+            it.progress_callback = Addresses.ofProgressCallback()
+        }
+    }
 
     companion object {
         /** For [longSidePx]: photos are not scaled. */
-        const val LONG_SIDE_FULL = -1
+        const val LONG_SIDE_FULL = MAQ_SCENE_LONG_SIDE_FULL
 
         /** For [minVariation]: all points are view-dependent. */
-        const val VARIATION_ALL = -1.0
+        const val VARIATION_ALL = MAQ_SCENE_VARIATION_ALL.toDouble()
     }
 }
 
@@ -78,9 +83,10 @@ data class SceneBuildStats(
     val packMs: Double,
 ) {
     internal companion object {
-        fun of(s: DoubleArray) =
+        fun of(s: maq_scene_build_stats) =
             SceneBuildStats(
-                s[0].toInt(), s[1].toInt(), s[2].toLong(), s[3].toLong(), s[4], s[5], s[6], s[7], s[8], s[9], s[10],
+                s.view_count, s.unused_view_count, s.cloud_point_count, s.seen_point_count, s.load_ms, s.visibility_ms,
+                s.align_ms, s.extract_ms, s.accumulate_ms, s.solve_ms, s.pack_ms,
             )
     }
 }
@@ -106,7 +112,25 @@ class PointCloud(
         }
     }
 
+    internal fun native(): maq_point_cloud {
+        val memory = Memory(xyz)
+        if (pointCount !in 0..memory.sizeBytes / POINT_BYTES) {
+            val problem =
+                "A cloud needs $POINT_BYTES bytes for each of its $pointCount points, but its buffer has " +
+                    "${memory.sizeBytes} bytes."
+            throw MaquetteException(Status.INVALID_ARGUMENT, problem)
+        }
+        return maq_point_cloud().also {
+            it.point_count = pointCount
+            it.xyz.set(memory)
+            it.origin = origin
+            it.up = up
+        }
+    }
+
     companion object {
+        private const val POINT_BYTES = 3 * Float.SIZE_BYTES
+
         /** A cloud from an array of x, y, z of each point. */
         fun of(
             xyz: FloatArray,
@@ -134,21 +158,13 @@ class SceneBuilder internal constructor(
     private val handle =
         Handle(
             this,
-            NativeScene.createBuilder(
-                context,
-                cloud.xyz,
-                cloud.pointCount,
-                (cloud.origin + cloud.up).toDoubleArray(),
-                bundle.folder,
-                bundle.names,
-                bundle.buffers,
-                config.values(),
-            ),
-            NativeScene::destroyBuilder,
+            Native.maq_scene_builder_create(context, config.native(bundle), cloud.native()),
+            Native::maq_scene_builder_destroy,
         )
 
     /** As it is now. */
-    val stats: SceneBuildStats get() = SceneBuildStats.of(handle.use(NativeScene::builderStats))
+    val stats: SceneBuildStats get() = 
+        SceneBuildStats.of(handle.read(maq_scene_build_stats(), Native::maq_scene_builder_get_stats))
 
     /**
      * Adds a photo of any format but depth, which may be closed afterwards. When it fails or is cancelled, the builder
@@ -166,21 +182,24 @@ class SceneBuilder internal constructor(
         progress: Progress? = null,
     ): Long =
         handle.use { builder ->
-            photo.handle.use { NativeScene.addView(builder, it, camera.values(), progress?.let(::NativeProgress)) }
+            photo.handle.use { frame ->
+                val seen = Memory(Long.SIZE_BYTES)
+                Callbacks.during(progress) {
+                    Native.maq_scene_builder_add_view(builder, frame, camera.native(), seen)
+                }
+                seen.long(0)
+            }
         }
 
     /** Cancels the [addView] that runs, or else the next; from any thread. Does not block. */
-    fun cancel() = handle.use(NativeScene::cancelBuilder)
+    fun cancel() = handle.use(Native::maq_scene_builder_cancel)
 
     /**
      * Builds a scene from the photos so far; more can be added afterwards, for another scene.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] if no photo saw a point, [Status.OUT_OF_MEMORY].
      */
-    fun finish(): Scene {
-        val scene = handle.use(NativeScene::finishBuilder)
-        return Scene(scene, SceneBuildStats.of(NativeScene.buildStats(scene)))
-    }
+    fun finish(): Scene = Scene.of(handle.use(Native::maq_scene_builder_finish))
 
     /** Scenes that it finished stay valid. */
     override fun close() = handle.close()

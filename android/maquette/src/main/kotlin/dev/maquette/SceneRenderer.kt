@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeScene
+import dev.maquette.jni.*
 
 /**
  * Renders views of a scene. Made by [Maquette.sceneRenderer]; the scene may be closed.
@@ -18,17 +18,8 @@ class SceneRenderer internal constructor(
     private val handle =
         Handle(
             this,
-            scene.handle.use {
-                NativeScene.createRenderer(
-                    context,
-                    it,
-                    bundle.folder,
-                    bundle.names,
-                    bundle.buffers,
-                    config.values(),
-                )
-            },
-            NativeScene::destroyRenderer,
+            scene.handle.use { Native.maq_scene_renderer_create(context, config.native(bundle), it) },
+            Native::maq_scene_renderer_destroy,
         )
 
     /**
@@ -47,19 +38,14 @@ class SceneRenderer internal constructor(
         val imagePoolSize: Int = 0,
         val allowSpinning: Boolean = false,
     ) {
-        internal fun values(): DoubleArray {
-            val rgb = background ?: 0
-            return doubleArrayOf(
-                threads.toDouble(),
-                if (background != null) 1.0 else 0.0,
-                (rgb shr 16 and 0xFF).toDouble(),
-                (rgb shr 8 and 0xFF).toDouble(),
-                (rgb and 0xFF).toDouble(),
-                nearDepth,
-                imagePoolSize.toDouble(),
-                if (allowSpinning) 1.0 else 0.0,
-            )
-        }
+        internal fun native(bundle: ModelBundle) =
+            maq_scene_renderer_config().also {
+                it.model.set(bundle, threads, spinning = spinning(allowSpinning))
+                it.use_background = (background != null).toInt()
+                it.background = rgbOf(background)
+                it.near_depth = nearDepth
+                it.image_pool_size = imagePoolSize
+            }
     }
 
     /**
@@ -71,7 +57,7 @@ class SceneRenderer internal constructor(
      *   [Status.POOL_EMPTY] while [Config.imagePoolSize] images are open.
      */
     fun run(camera: PinholeCamera): RenderedImage =
-        RenderedImage(handle.use { NativeScene.render(it, camera.values()) })
+        RenderedImage(handle.use { Native.maq_scene_renderer_run(it, camera.native()) })
 
     /** Images that are open stay valid. */
     override fun close() = handle.close()

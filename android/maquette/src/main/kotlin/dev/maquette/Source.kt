@@ -1,9 +1,9 @@
 package dev.maquette
 
-import dev.maquette.jni.NativeSource
+import dev.maquette.jni.*
 
 /** A timeout without limit. */
-const val WAIT_FOREVER: Long = -1
+const val WAIT_FOREVER: Long = MAQ_WAIT_FOREVER.toLong()
 
 /** A negative timeout is without limit. */
 internal fun nanoseconds(timeoutMs: Long): Long =
@@ -26,13 +26,14 @@ internal fun nanoseconds(timeoutMs: Long): Long =
  */
 class Source internal constructor(context: Long, uri: String, config: Config) : AutoCloseable {
     internal val stateChanges =
-        Changes { state, _, reason -> Change(State.entries.first { it.ordinal + 1 == state }, reason) }
+        Changes { state, _, reason -> Change(State.entries.first { it.code == state }, reason) }
     internal val handle =
-        Handle(
-            this,
-            NativeSource.create(context, uri.toByteArray(), config.values(), stateChanges),
-            NativeSource::destroy,
-        )
+        handleWithCallback(stateChanges, Native::maq_source_destroy) { id ->
+            val native = config.native()
+            native.state_callback = Addresses.ofSourceCallback()
+            native.state_user_data = id
+            Native.maq_source_create(context, textOf(uri), native)
+        }
 
     /**
      * How it is opened.
@@ -55,16 +56,16 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
         val isLoop: Boolean = false,
         val maxSidePx: Int = 0,
     ) {
-        internal fun values() =
-            doubleArrayOf(
-                framePoolSize.toDouble(),
-                queueLength.toDouble(),
-                stallMs.toDouble(),
-                reconnectMs.toDouble(),
-                if (isRealTime) 1.0 else 0.0,
-                if (isLoop) 1.0 else 0.0,
-                maxSidePx.toDouble(),
-            )
+        internal fun native() =
+            maq_source_config().also {
+                it.frame_pool_size = framePoolSize
+                it.queue_length = queueLength
+                it.stall_ms = stallMs
+                it.reconnect_ms = reconnectMs
+                it.real_time = isRealTime.toInt()
+                it.loop = isLoop.toInt()
+                it.max_side_px = maxSidePx
+            }
     }
 
     /**
@@ -88,50 +89,50 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
     )
 
     /** What happens to a camera. */
-    enum class State {
-        STARTED,
+    enum class State(internal val code: Int) {
+        STARTED(MAQ_SOURCE_STARTED),
 
         /** No frame for [Config.stallMs]; the camera may recover by itself. */
-        STALLED,
+        STALLED(MAQ_SOURCE_STALLED),
 
         /** Unplugged or broken. */
-        LOST,
+        LOST(MAQ_SOURCE_LOST),
 
         /** The source tries to open it again, for [Config.reconnectMs]. */
-        RECONNECTING,
+        RECONNECTING(MAQ_SOURCE_RECONNECTING),
 
         /** Frames come again. */
-        RECONNECTED,
+        RECONNECTED(MAQ_SOURCE_RECONNECTED),
     }
 
     /** A change of state; [reason] is a sentence. */
     data class Change(val state: State, val reason: String)
 
     /** A setting of a camera. A device has some of them. */
-    enum class Control {
+    enum class Control(internal val code: Int) {
         /** 1: the device sets exposure and, on most devices, gain; 0: manual. */
-        AUTO_EXPOSURE,
+        AUTO_EXPOSURE(MAQ_SOURCE_CONTROL_AUTO_EXPOSURE),
 
         /** Microseconds. */
-        EXPOSURE,
+        EXPOSURE(MAQ_SOURCE_CONTROL_EXPOSURE),
 
         /** In units of the device. */
-        GAIN,
+        GAIN(MAQ_SOURCE_CONTROL_GAIN),
 
         /** 1 or 0. */
-        AUTO_FOCUS,
+        AUTO_FOCUS(MAQ_SOURCE_CONTROL_AUTO_FOCUS),
 
         /** In units of the device. */
-        FOCUS,
+        FOCUS(MAQ_SOURCE_CONTROL_FOCUS),
 
         /** 1 or 0. */
-        AUTO_WHITE_BALANCE,
+        AUTO_WHITE_BALANCE(MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE),
 
         /** Kelvin. */
-        WHITE_BALANCE,
+        WHITE_BALANCE(MAQ_SOURCE_CONTROL_WHITE_BALANCE),
 
         /** In units of the device. */
-        BRIGHTNESS,
+        BRIGHTNESS(MAQ_SOURCE_CONTROL_BRIGHTNESS),
     }
 
     /** The range of a control, in its unit; values are rounded to the nearest step. [value] is the one set now. */
@@ -156,15 +157,19 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
     /** As it is now. */
     val info: Info
         get() {
-            val i = handle.use(NativeSource::info)
+            val i = handle.read(maq_source_info(), Native::maq_source_get_info)
             return Info(
-                i[0].toInt(), i[1].toInt(), i[2], i[3].toLong(), i[4] != 0.0, Clock.of(i[5].toInt()), i[6].toInt(),
-                i[7].toLong(),
+                i.width_px, i.height_px, i.fps, i.frame_count, i.is_live != 0, Clock.of(i.clock), i.frame_pool_size,
+                i.dropped_frame_count,
             )
         }
 
     /** How the camera maps directions to pixels; null if that is unknown. */
-    val intrinsics: Intrinsics? get() = handle.use(NativeSource::intrinsics)?.let(Intrinsics::of)
+    val intrinsics: Intrinsics?
+        get() =
+            orNull(Status.UNSUPPORTED) {
+                Intrinsics.of(handle.read(maq_intrinsics(), Native::maq_source_get_intrinsics))
+            }
 
     /**
      * Waits for the next frame; of a camera, for the oldest that waits. Files and stubs deliver at once, however short
@@ -176,13 +181,13 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
      *   [Config.framePoolSize] frames are open; [Status.UNREADABLE] for a damaged file; [Status.INVALID_ARGUMENT] while
      *   another thread acquires a frame.
      */
-    fun acquireFrame(timeoutMs: Long = WAIT_FOREVER): Frame? {
-        val frame = handle.use { NativeSource.acquire(it, nanoseconds(timeoutMs)) }
-        return if (frame == 0L) null else Frame(frame)
-    }
+    fun acquireFrame(timeoutMs: Long = WAIT_FOREVER): Frame? =
+        orNull(Status.END_OF_STREAM, Status.CANCELLED) {
+            Frame(handle.use { Native.maq_source_acquire_frame(it, nanoseconds(timeoutMs)) })
+        }
 
     /** Stops the source for good. Frames that are open stay valid. Does not block. */
-    fun stop() = handle.use(NativeSource::stop)
+    fun stop() = handle.use(Native::maq_source_stop)
 
     /**
      * The next frame will be the first at this time after the source's first frame, or later.
@@ -190,17 +195,19 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
      * @throws MaquetteException with [Status.UNSUPPORTED] for sources other than clips, recordings and stubs, and with
      *   [Status.INVALID_ARGUMENT] for a negative time.
      */
-    fun seek(timeNs: Long) = handle.use { NativeSource.seek(it, timeNs) }
+    fun seek(timeNs: Long) = handle.use { Native.maq_source_seek(it, timeNs) }
 
     /**
      * A control of the camera; null if the device does not have it. Blocks while the device answers.
      *
      * @throws MaquetteException with [Status.BUSY] (not now) and [Status.DEVICE_LOST].
      */
-    fun control(control: Control): ControlInfo? {
-        val c = handle.use { NativeSource.control(it, control.ordinal + 1) } ?: return null
-        return ControlInfo(c[0], c[1], c[2], c[3], c[4])
-    }
+    fun control(control: Control): ControlInfo? =
+        orNull(Status.UNSUPPORTED) {
+            val c = maq_source_control_info()
+            handle.use { Native.maq_source_get_control(it, control.code, c) }
+            ControlInfo(c.min, c.max, c.step, c.default_value, c.value)
+        }
 
     /**
      * Sets a control. A manual exposure, gain, focus or white balance switches off its automatic mode. Blocks while the
@@ -210,11 +217,11 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
      *   of its range, [Status.BUSY] (not now) and [Status.DEVICE_LOST].
      */
     fun setControl(control: Control, value: Double) =
-        handle.use { NativeSource.setControl(it, control.ordinal + 1, value) }
+        handle.use { Native.maq_source_set_control(it, control.code, value) }
 
     /** Stops the source and frees it. Blocks for at most 50 ms. Frames that are open stay valid. */
     override fun close() {
-        handle.closeAfter(NativeSource::stop)
+        handle.closeAfter(Native::maq_source_stop)
         stateChanges.end()
     }
 
@@ -222,9 +229,9 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
         /** The kinds of sources of this build. */
         val schemes: List<Scheme>
             get() =
-                List(NativeSource.schemeCount()) { index ->
-                    val (name, example, summary, isCamera) = NativeSource.scheme(index).map(ByteArray::decodeToString)
-                    Scheme(name, example, summary, isCamera == "1")
+                List(Native.maq_source_get_scheme_count()) { index ->
+                    val s = maq_source_scheme().also { Native.maq_source_get_scheme(index, it) }
+                    Scheme(s.name.text(), s.example.text(), s.summary.text(), s.is_camera != 0)
                 }
     }
 }
@@ -263,20 +270,22 @@ data class Camera(
 
     internal companion object {
         fun all(context: Long): List<Camera> {
-            val list = NativeSource.createCameraList(context)
+            val list = Native.maq_camera_list_create(context)
             try {
-                return List(NativeSource.cameraCount(list)) { index ->
-                    val texts = NativeSource.cameraTexts(list, index).map(ByteArray::decodeToString)
-                    val numbers = NativeSource.cameraNumbers(list, index)
-                    val modes =
-                        texts.drop(4).zip(numbers.drop(1).chunked(4)) { format, (isUsable, width, height, fps) ->
-                            Mode(format, isUsable != 0.0, width.toInt(), height.toInt(), fps)
-                        }
-                    Camera(texts[0], texts[1], texts[2], Status.of(numbers[0].toInt()), texts[3], modes)
-                }
+                return List(Native.maq_camera_list_get_count(list)) { index -> cameraAt(list, index) }
             } finally {
-                NativeSource.destroyCameraList(list)
+                Native.maq_camera_list_destroy(list)
             }
+        }
+
+        private fun cameraAt(list: Long, index: Int): Camera {
+            val c = maq_camera_info().also { Native.maq_camera_list_get_camera(list, index, it) }
+            val modes =
+                List(c.mode_count) { mode ->
+                    val m = maq_camera_mode().also { Native.maq_camera_list_get_mode(list, index, mode, it) }
+                    Mode(m.format, m.is_usable != 0, m.width_px, m.height_px, m.fps)
+                }
+            return Camera(c.uri.text(), c.name.text(), c.bus.text(), Status.of(c.status), c.problem.text(), modes)
         }
     }
 }

@@ -1,27 +1,29 @@
 package dev.maquette
 
+import dev.maquette.jni.*
+
 /** The outcome of a call into the library (`maq_status` of its C API). */
 enum class Status(internal val code: Int) {
-    OK(0),
-    INVALID_ARGUMENT(1),
-    VERSION_MISMATCH(2),
-    NOT_FOUND(3),
-    UNREADABLE(4),
-    IMAGE_SIZE(5),
-    BAD_BUNDLE(6),
-    UNSUPPORTED(7),
-    RUNTIME_LIBRARY(8),
-    POOL_EMPTY(9),
-    INFERENCE(10),
-    OUT_OF_MEMORY(11),
-    INTERNAL(12),
-    END_OF_STREAM(13),
-    TIMEOUT(14),
-    DEVICE_LOST(15),
-    BUSY(16),
-    NO_PERMISSION(17),
-    UNWRITABLE(18),
-    CANCELLED(19),
+    OK(MAQ_OK),
+    INVALID_ARGUMENT(MAQ_ERROR_INVALID_ARGUMENT),
+    VERSION_MISMATCH(MAQ_ERROR_VERSION_MISMATCH),
+    NOT_FOUND(MAQ_ERROR_NOT_FOUND),
+    UNREADABLE(MAQ_ERROR_UNREADABLE),
+    IMAGE_SIZE(MAQ_ERROR_IMAGE_SIZE),
+    BAD_BUNDLE(MAQ_ERROR_BAD_BUNDLE),
+    UNSUPPORTED(MAQ_ERROR_UNSUPPORTED),
+    RUNTIME_LIBRARY(MAQ_ERROR_RUNTIME_LIBRARY),
+    POOL_EMPTY(MAQ_ERROR_POOL_EMPTY),
+    INFERENCE(MAQ_ERROR_INFERENCE),
+    OUT_OF_MEMORY(MAQ_ERROR_OUT_OF_MEMORY),
+    INTERNAL(MAQ_ERROR_INTERNAL),
+    END_OF_STREAM(MAQ_END_OF_STREAM),
+    TIMEOUT(MAQ_TIMEOUT),
+    DEVICE_LOST(MAQ_ERROR_DEVICE_LOST),
+    BUSY(MAQ_ERROR_BUSY),
+    NO_PERMISSION(MAQ_ERROR_NO_PERMISSION),
+    UNWRITABLE(MAQ_ERROR_UNWRITABLE),
+    CANCELLED(MAQ_CANCELLED),
     ;
 
     internal companion object {
@@ -34,4 +36,22 @@ class MaquetteException(val status: Status, message: String) : RuntimeException(
     /** Called from native code. */
     @Suppress("unused")
     internal constructor(code: Int, utf8: ByteArray) : this(Status.of(code), String(utf8, Charsets.UTF_8))
+}
+
+/** The result of [call]; null if it ends with one of [statuses]. */
+internal inline fun <T> orNull(vararg statuses: Status, call: () -> T): T? =
+    try {
+        call()
+    } catch (error: MaquetteException) {
+        if (error.status in statuses) null else throw error
+    }
+
+/** Receives the progress of a long call, on the thread of that call, which waits meanwhile. */
+fun interface Progress {
+    /**
+     * @param done the finished fraction, 0 to 1.
+     * @param stage what runs now, in a sentence.
+     * @return false to cancel.
+     */
+    fun onProgress(done: Double, stage: String): Boolean
 }

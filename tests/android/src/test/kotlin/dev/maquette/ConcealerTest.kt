@@ -1,6 +1,6 @@
 package dev.maquette
 
-import dev.maquette.jni.NativePrediction
+import dev.maquette.jni.Native
 import java.util.concurrent.CountDownLatch
 import kotlin.concurrent.thread
 import kotlinx.coroutines.CompletableDeferred
@@ -210,9 +210,7 @@ class ConcealerTest : AndroidTest() {
             }
             maquette.concealer(source, config).close()
             source.handle.use { handle ->
-                fun create(values: DoubleArray) = NativePrediction.createConcealer(0, handle, source, values)
-                failure(Status.INVALID_ARGUMENT) { create(config.values()) }
-                failure(Status.INTERNAL) { create(DoubleArray(0)) }
+                failure(Status.INVALID_ARGUMENT) { Native.maq_concealer_create(0, handle, config.native()) }
             }
         }
         live("fps=20&unplug@0.5s").use { source ->

@@ -1,6 +1,7 @@
 package dev.maquette
 
-import dev.maquette.jni.NativePrediction
+import dev.maquette.jni.Native
+import dev.maquette.jni.maq_novelty_score
 import java.nio.ByteBuffer
 import org.junit.Assert.assertArrayEquals
 import org.junit.Assert.assertEquals
@@ -152,11 +153,9 @@ class NoveltyTest : AndroidTest() {
             val closed = MovingTexture.frame(maquette, 2).apply { close() }
             assertClosed { novelty.push(closed) }
         }
-        failure(Status.INVALID_ARGUMENT) { NativePrediction.pushToNovelty(0, 0) }
-        failure(Status.INVALID_ARGUMENT) { NativePrediction.reconstruction(0) }
-        failure(Status.INTERNAL) {
-            NativePrediction.createNovelty(0, null, null, null, DoubleArray(2), 0)
-        }
+        failure(Status.INVALID_ARGUMENT) { Native.maq_novelty_push(0, 0, maq_novelty_score()) }
+        failure(Status.INVALID_ARGUMENT) { Native.maq_novelty_acquire_reconstruction(0) }
+        failure(Status.INVALID_ARGUMENT) { Native.maq_novelty_create(0, null) }
     }
 
     @Test

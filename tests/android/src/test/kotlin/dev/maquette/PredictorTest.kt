@@ -1,6 +1,8 @@
 package dev.maquette
 
-import dev.maquette.jni.NativePrediction
+import dev.maquette.jni.Memory
+import dev.maquette.jni.Native
+import dev.maquette.jni.maq_predictor_stats
 import java.io.File
 import java.lang.reflect.InvocationTargetException
 import java.nio.ByteBuffer
@@ -200,18 +202,17 @@ class PredictorTest : AndroidTest() {
             val said = (refused.cause as NullPointerException).message!!
             assertTrue(said, "frame" in said)
             // Native methods, as if the Kotlin classes had let them pass.
-            fun create(values: DoubleArray) = NativePrediction.createPredictor(0, null, null, null, values, 0)
-            failure(Status.INVALID_ARGUMENT) { create(byMotion.values()) }
-            failure(Status.INVALID_ARGUMENT) { NativePrediction.pushToPredictor(0, 0) }
-            failure(Status.INVALID_ARGUMENT) { NativePrediction.predict(0, 0.1) }
-            failure(Status.INVALID_ARGUMENT) { NativePrediction.statsOfPredictor(0) }
-            failure(Status.INTERNAL) { create(doubleArrayOf(1.0)) }
-            val createPredictor = NativePrediction::class.java.methods.single { it.name == "createPredictor" }
-            val ofNull =
-                assertThrows(InvocationTargetException::class.java) {
-                    createPredictor.invoke(null, 0L, null, null, null, null, 0L)
-                }
-            assertEquals(Status.INTERNAL, (ofNull.cause as MaquetteException).status)
+            failure(Status.INVALID_ARGUMENT) { Native.maq_predictor_create(0, byMotion.native(null)) }
+            failure(Status.INVALID_ARGUMENT) { Native.maq_predictor_push(0, 0) }
+            failure(Status.INVALID_ARGUMENT) { Native.maq_predictor_predict(0, 0.1) }
+            failure(Status.INVALID_ARGUMENT) { Native.maq_predictor_get_stats(0, maq_predictor_stats()) }
+            failure(Status.INVALID_ARGUMENT) { Native.maq_predictor_get_stats(0, null) }
+            maquette.predictor(byMotion).use { predictor ->
+                // A struct of another size: of a Kotlin class that does not fit the library.
+                val short = Memory(maq_predictor_stats().sizeBytes).apply { int(0, sizeBytes - 4) }
+                val said = failure(Status.INVALID_ARGUMENT) { predictor.handle.use { Native.maq_predictor_get_stats(it, short) } }
+                assertTrue(said, "struct_size" in said)
+            }
         }
 
     @Test

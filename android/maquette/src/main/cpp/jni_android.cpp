@@ -1,20 +1,23 @@
-// Pictures of Android's own classes: bitmaps and hardware buffers become frames, and are drawn on where they lie.
+// Bitmaps, hardware buffers and surfaces of Android: they become frames, and results are drawn on them in place.
 #include <cstring>
 #include <memory>
+#include <string>
 
 #include "graphics/hardware_buffer.h"
+#include "graphics/preview.h"
 #include "jni_call.h"
 
+using maq_jni::address_of;
 using maq_jni::call;
 using maq_jni::Canvas;
 using maq_jni::check;
-using maq_jni::handle;
 using maq_jni::object;
+using maq_jni::Preview;
 using maq_jni::StatusError;
 
 namespace {
 
-// As AndroidBitmapInfo of <android/bitmap.h>.
+// Equals AndroidBitmapInfo of <android/bitmap.h>.
 struct BitmapInfo {
   uint32_t width, height, stride;
   int32_t format;
@@ -22,7 +25,7 @@ struct BitmapInfo {
 };
 constexpr int32_t kRgba8888 = 1;  // ANDROID_BITMAP_FORMAT_RGBA_8888
 
-// Of libjnigraphics.so; they return 0, or an error.
+// The functions of libjnigraphics.so; they return 0 or an error.
 struct BitmapFunctions {
   int (*get_info)(JNIEnv*, jobject, BitmapInfo*);
   int (*lock_pixels)(JNIEnv*, jobject, void**);
@@ -68,13 +71,15 @@ void with_bitmap(JNIEnv* env, jobject bitmap, const Draw& draw) {
         size_t(info.stride) * info.height});
 }
 
-// The buffer of a java object, which stays that object's.
+// The native object behind an object of Java, by a function of libandroid.so; it stays Java's or is referenced.
+template <typename Native>
+Native* native_of(JNIEnv* env, jobject of, const char* function) {
+  static void* const library = maq_jni::open_android_library("libandroid.so");
+  return reinterpret_cast<Native* (*)(JNIEnv*, jobject)>(maq_jni::find_android_function(library, function))(env, of);
+}
+
 AHardwareBuffer* buffer_of(JNIEnv* env, jobject buffer) {
-  using FromHardwareBuffer = AHardwareBuffer*(JNIEnv*, jobject);
-  static FromHardwareBuffer* const from_hardware_buffer =
-      reinterpret_cast<FromHardwareBuffer*>(maq_jni::find_android_function(
-          maq_jni::open_android_library("libandroid.so"), "AHardwareBuffer_fromHardwareBuffer"));
-  AHardwareBuffer* const found = from_hardware_buffer(env, buffer);
+  auto* const found = native_of<AHardwareBuffer>(env, buffer, "AHardwareBuffer_fromHardwareBuffer");
   if (found == nullptr) maq_jni::refuse("The hardware buffer has no memory; it may be closed.");
   return found;
 }
@@ -85,7 +90,7 @@ void draw_on(JNIEnv* env, jobject onto, bool is_bitmap, int width_px, int height
   const auto draw_checked = [&](const Canvas& canvas) {
     if (canvas.width_px == width_px && canvas.height_px == height_px) return check(draw(canvas));
     const auto text = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
-    maq_jni::refuse("The picture to draw on has " + text(canvas.width_px, canvas.height_px) +
+    maq_jni::refuse("The image to draw on has " + text(canvas.width_px, canvas.height_px) +
                     " pixels, but the frame has " + text(width_px, height_px) + ".");
   };
   if (is_bitmap) return with_bitmap(env, onto, draw_checked);
@@ -94,7 +99,7 @@ void draw_on(JNIEnv* env, jobject onto, bool is_bitmap, int width_px, int height
 
 }  // namespace
 
-MAQ_NATIVE_OF(NativePicture, void, copyFrame)(JNIEnv* env, jclass, jlong frame, jobject onto, jboolean is_bitmap) {
+MAQ_NATIVE(Android, void, copyFrame)(JNIEnv* env, jclass, jlong frame, jobject onto, jboolean is_bitmap) {
   call(env, [&] {
     auto* const from = object<maq_frame>(frame);
     maq_frame_desc desc;
@@ -107,7 +112,7 @@ MAQ_NATIVE_OF(NativePicture, void, copyFrame)(JNIEnv* env, jclass, jlong frame, 
 }
 
 // `frame` 0: the people alone.
-MAQ_NATIVE_OF(NativePicture, void, drawResult)
+MAQ_NATIVE(Android, void, drawResult)
 (JNIEnv* env, jclass, jlong result, jlong frame, jint opacity, jobject onto, jboolean is_bitmap) {
   call(env, [&] {
     auto* const from = object<maq_densepose_result>(result);
@@ -124,7 +129,7 @@ MAQ_NATIVE_OF(NativePicture, void, drawResult)
 }
 
 // A copy: the app may draw on the bitmap again.
-MAQ_NATIVE_OF(NativePicture, jlong, frameOfBitmap)
+MAQ_NATIVE(Android, jlong, frameOfBitmap)
 (JNIEnv* env, jclass, jlong context, jobject bitmap, jlong timestamp_ns) {
   return call(env, [&] {
     maq_frame* frame = nullptr;
@@ -143,22 +148,41 @@ MAQ_NATIVE_OF(NativePicture, jlong, frameOfBitmap)
       check(maq_frame_wrap(object<maq_context>(context), &desc, free, pixels.get(), &frame));
       pixels.release();
     });
-    return handle(frame);
+    return address_of(frame);
   });
 }
 
-MAQ_NATIVE_OF(NativePicture, jlong, frameOfBuffer)
-(JNIEnv* env, jclass, jlong context, jobject buffer, jboolean is_full_range, jint rotation_deg, jlong timestamp_ns,
- jint clock, jlong sequence) {
+MAQ_NATIVE(Android, jlong, frameOfBuffer)
+(JNIEnv* env, jclass, jlong context, jobject buffer, jobject image) {
   return call(env, [&] {
-    maq_yuv_image like;
-    check(maq_yuv_image_init(&like, sizeof like));
-    like.is_video_range = is_full_range ? 0 : 1;
-    like.rotation_deg = rotation_deg;
-    like.timestamp_ns = timestamp_ns;
-    like.clock = maq_clock(clock);
-    like.sequence = uint64_t(sequence);
+    const auto& like = *static_cast<const maq_yuv_image*>(maq_jni::address_in(env, image));
     const maq_jni::GraphicsFunctions& android = maq_jni::graphics_functions();
-    return handle(maq_jni::frame_of(android, buffer_of(env, buffer), object<maq_context>(context), like));
+    return address_of(maq_jni::frame_of(android, buffer_of(env, buffer), object<maq_context>(context), like));
+  });
+}
+
+MAQ_NATIVE(Android, jlong, createPreview)(JNIEnv* env, jclass) {
+  return call(env, [&] { return address_of(new Preview(maq_jni::graphics_functions())); });
+}
+
+MAQ_NATIVE(Android, void, destroyPreview)(JNIEnv*, jclass, jlong preview) { delete object<Preview>(preview); }
+
+MAQ_NATIVE(Android, void, setSurface)
+(JNIEnv* env, jclass, jlong preview, jobject surface, jint width_px, jint height_px) {
+  call(env, [&] {
+    auto* const window =
+        surface == nullptr ? nullptr : native_of<ANativeWindow>(env, surface, "ANativeWindow_fromSurface");
+    object<Preview>(preview)->set_window(window, width_px, height_px);
+  });
+}
+
+MAQ_NATIVE(Android, jboolean, drawOnSurface)
+(JNIEnv* env, jclass, jlong preview, jlong frame, jlong result, jboolean fills, jint opacity, jboolean is_mirrored) {
+  return call(env, [&]() -> jboolean {
+    const maq_jni::PreviewStyle style{fills == JNI_TRUE ? maq_jni::Scaling::kFill : maq_jni::Scaling::kFit, opacity,
+                                      is_mirrored == JNI_TRUE};
+    return object<Preview>(preview)->draw(object<maq_frame>(frame), object<maq_densepose_result>(result), style)
+               ? JNI_TRUE
+               : JNI_FALSE;
   });
 }

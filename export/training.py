@@ -153,8 +153,13 @@ def save_atomically(state: dict, path: Path) -> None:
 
 
 def write_log(log: list[dict], folder: Path, figures: Sequence[str], against: str, label: str) -> None:
-    """log.json, and curves.png: the loss's terms over steps, and the validation's `figures` against another column."""
+    """Writes log.json and curves.png."""
     (folder / "log.json").write_text(json.dumps(log))
+    draw_curves(log, folder / "curves.png", figures, against, label)
+
+
+def draw_curves(log: list[dict], path: Path, figures: Sequence[str], against: str, label: str) -> None:
+    """Draws the loss's terms over steps, and the validation's `figures` against another column."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(12, 4.5))
     steps = [row for row in log if "loss" in row]
     for name in steps[-1]["terms"] if steps else ():
@@ -170,7 +175,7 @@ def write_log(log: list[dict], folder: Path, figures: Sequence[str], against: st
         axis.grid(alpha=0.3)
         axis.legend(fontsize=7)
     figure.tight_layout()
-    figure.savefig(folder / "curves.png", dpi=90)
+    figure.savefig(path, dpi=90)
     plt.close(figure)
 
 

@@ -4,6 +4,7 @@ bodies)."""
 
 import os
 import signal
+import sys
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when numpy and torch are loaded
 
@@ -37,6 +38,13 @@ def signal_handlers():
     yield
     for name, handler in handlers.items():
         signal.signal(name, handler)
+
+
+@pytest.fixture(autouse=True)
+def empty_curves(request, monkeypatch):
+    """Trainings write an empty curves.png: drawing one takes longer than training. @pytest.mark.curves draws it."""
+    if "export.training" in sys.modules and not request.node.get_closest_marker("curves"):
+        monkeypatch.setattr("export.training.draw_curves", lambda log, path, *_: path.write_bytes(b""))
 
 
 @pytest.fixture(scope="session")

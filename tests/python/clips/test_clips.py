@@ -155,10 +155,11 @@ def test_hidden_points_are_said_to_be_hidden(pushing):
 
 
 def test_a_clip_of_pushing_depends_on_its_number_alone_and_its_motion_is_exact(pushing):
-    clip, _, again = (pushing.pushing_clip("val", number, large=True) for number in (1, 2, 1))
+    clip, _, again = (pushing.pushing_clip("val", number, large=False) for number in (1, 2, 1))
     assert np.array_equal(clip.small.rgb, again.small.rgb)
-    assert np.array_equal(clip.large.motion, again.large.motion)
-    errors = [e for t in range(0, 28, 3) if (e := relative_error(clip.large, t)) is not None]
+    assert np.array_equal(clip.small.motion, again.small.motion)
+    large = pushing.pushing_clip("val", 1, large=True).large
+    errors = [e for t in range(0, 28, 3) if (e := relative_error(large, t)) is not None]
     assert errors, "nothing moves"
     assert np.median(errors) < 0.35
 

@@ -44,8 +44,8 @@ def run(monkeypatch, shards, out, *options, stop_after=None) -> list[float]:
         return terms
 
     monkeypatch.setattr(train, "batch_loss", recorded)
-    given = ["train", "--data", str(shards), "--out", str(out), "--batch", "2", "--threads", "1", "--no-bf16", "--width", "16"]
-    monkeypatch.setattr("sys.argv", [*given, *options])
+    given = ["train", "--data", str(shards), "--out", str(out), "--batch", "2", "--width", "16"]
+    monkeypatch.setattr("sys.argv", [*given, "--threads", "1", "--no-bf16", *options])
     train.main()
     return losses
 

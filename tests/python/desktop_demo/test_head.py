@@ -24,7 +24,7 @@ def shown(tmp_path_factory):
     normals = ["--shading", "normals"]
     options = {"colour": [], "normals": normals, "over": over, "normals_over": over + normals}
     return {
-        name: show(folder, PHOTO, "--head", "--fit-seconds", "0.5", "--frames", 5, *of) for name, of in options.items()
+        name: show(folder, PHOTO, "--head", "--fit-seconds", "0.2", "--frames", 5, *of) for name, of in options.items()
     }
 
 

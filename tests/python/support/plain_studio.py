@@ -4,7 +4,6 @@ photos. What it draws depends on nothing but the job, in any process."""
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import mkdtemp
 from unittest.mock import patch
 
 import cv2
@@ -46,18 +45,3 @@ def plain_studio(folder: Path) -> Iterator:
         patch.object(scene.assets, "skin_texture", lambda: folder / "skin.png"),
     ):
         yield scene.Studio("val", WIDTH, HEIGHT, folder, points=True)
-
-
-_kept: list = []
-
-
-def render(job: tuple[int, int, Path]) -> int:
-    """A job of export.jobs: shard `number` of so many images, written to a path. Gives the number back."""
-    from export.people.dataset import render_shard
-
-    number, images, path = job
-    if not _kept:
-        context = plain_studio(Path(mkdtemp(prefix="maquette-studio-")))
-        _kept.extend([context, context.__enter__()])  # for as long as the process lives
-    render_shard(_kept[1], number, images, path)
-    return number

@@ -81,6 +81,18 @@ class Api:
                 add(name)
         return found
 
+    def groups_of_constants(self) -> list[list[tuple[str, int]]]:
+        """Name and value of the constants that are used: those of each enum, then the rest."""
+        enums = [self.ffi.typeof(name) for name in self.ffi.list_types()[0]]
+        groups = [[(kind.elements[n], n) for n in sorted(kind.elements)] for kind in enums if kind.kind == "enum"]
+        names = set(re.findall(r"\bMAQ_\w+", self.text)) - {name for group in groups for name, _ in group}
+        major, minor, patch = (getattr(self.constants, f"MAQ_VERSION_{part}") for part in ("MAJOR", "MINOR", "PATCH"))
+        rest = [(name, getattr(self.constants, name)) for name in sorted(names)]
+        rest = [(name, n - (1 << 32) if n >> 31 == 1 else n) for name, n in rest]  # an Int
+        groups.append([("MAQ_HEADER_VERSION", major * 10000 + minor * 100 + patch), *rest])
+        used = [[(name, n) for name, n in group if name in self.used] for group in groups]
+        return [group for group in used if group]
+
     def is_opaque(self, pointed: FFI.CType) -> bool:
         return pointed.kind == "struct" and pointed.fields is None
 
@@ -140,6 +152,13 @@ def _property(name: str, kotlin: str, read: str, write: str, is_input: bool) -> 
     return f"var {name}: {kotlin} get() = {read}; set(v) = {write}" if is_input else f"val {name} get() = {read}"
 
 
+def _packed(declarations: list[str], indent: str) -> list[str]:
+    """Several declarations a line."""
+    text = "; ".join(declaration.replace(" ", "~") for declaration in declarations)
+    lines = textwrap.wrap(text, 120 - len(indent), break_long_words=False, break_on_hyphens=False)
+    return [indent + line.rstrip(";").replace("~", " ") for line in lines]
+
+
 def _method(api: Api, name: str, result: str, parameters: list[tuple[str, str]]) -> list[str]:
     typed = [(parameter, api.parameter(c_type)) for c_type, parameter in parameters]
     returned = ": Long" if any(kotlin is None for _, kotlin in typed) else api.result(result)
@@ -169,12 +188,9 @@ def kotlin(api: Api) -> str:
     for name, (result, parameters) in api.functions().items():
         lines += _method(api, name, result, parameters)
     lines += ["}", ""]
-    version = [getattr(api.constants, f"MAQ_VERSION_{part}") for part in ("MAJOR", "MINOR", "PATCH")]
-    values = {"MAQ_HEADER_VERSION": version[0] * 10000 + version[1] * 100 + version[2]}
-    names = set(re.findall(r"\bMAQ_\w+", api.text)) & api.used
-    values |= {name: getattr(api.constants, name) for name in names}
-    values = {name: value - (1 << 32) if value >> 31 == 1 else value for name, value in values.items()}  # an Int
-    lines += [f"internal const val {name} = {value}" for name, value in sorted(values.items())]
+    for group in api.groups_of_constants():
+        lines += _packed([f"internal const val {name} = {value}" for name, value in group], "")
+    inputs = api.inputs()
     for name, kind in api.structs().items():
         fields = dict(kind.fields)
         base = "Struct" if "struct_size" in fields else "Memory"
@@ -182,11 +198,8 @@ def kotlin(api: Api) -> str:
             "",
             f"internal class {name}(outer: Memory? = null, at: Int = 0) : {base}({api.ffi.sizeof(kind)}, outer, at) {{",
         ]
-        lines += [
-            f"    {api.field(field_name, field, name in api.inputs())}"
-            for field_name, field in fields.items()
-            if field_name in api.used and field_name != "struct_size"
-        ]
+        used = [name for name in fields if name in api.used and name != "struct_size"]
+        lines += _packed([api.field(one, fields[one], name in inputs) for one in used], "    ")
         lines.append("}")
     return "\n".join(lines) + "\n"
 

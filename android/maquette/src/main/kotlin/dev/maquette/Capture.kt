@@ -7,8 +7,7 @@ import dev.maquette.jni.*
  * needed. All functions may be called from any thread.
  */
 class Capture internal constructor(context: Long, folder: String) : AutoCloseable {
-    internal val handle =
-        Handle(this, Native.maq_capture_open(context, textOf(folder)), Native::maq_capture_destroy)
+    internal val handle = Handle(this, Native.maq_capture_open(context, textOf(folder)), Native::maq_capture_destroy)
 
     /**
      * A photo.

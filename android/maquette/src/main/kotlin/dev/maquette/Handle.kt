@@ -38,7 +38,7 @@ internal class Handle(owner: Any, private val pointer: Long, private val release
     }
 
     /** Returns [struct], filled by [get]. */
-    fun <S : Memory> read(struct: S, get: (Long, Memory?) -> Unit): S = struct.also { use { native -> get(native, it) } }
+    fun <S : Memory> read(struct: S, get: (Long, Memory?) -> Unit): S = struct.apply { use { get(it, this) } }
 
     override fun close() {
         if (!isClosed.compareAndSet(false, true)) return
@@ -61,24 +61,14 @@ internal class Handle(owner: Any, private val pointer: Long, private val release
     }
 }
 
-/**
- * The handle of an object of [this] that tells [changes] its changes of state. [create] gets the number of these as the
- * callback's user data.
- */
-internal fun Any.handleWithCallback(changes: Changes<*>, destroy: (Long) -> Unit, create: (id: Long) -> Long): Handle {
-    val id = Callbacks.keep(changes)
-    val pointer =
-        try {
-            create(id)
-        } catch (error: MaquetteException) {
+/** A handle of this. The native object knows [kept] until it is destroyed, by the number that [create] gets. */
+internal fun Any.handleThatKeeps(kept: Any, destroy: (Long) -> Unit, create: (id: Long) -> Long): Handle =
+    Callbacks.keep(kept) { id ->
+        Handle(this, create(id)) {
+            destroy(it)
             Callbacks.release(id)
-            throw error
         }
-    return Handle(this, pointer) {
-        destroy(it) // from now on it tells nothing
-        Callbacks.release(id)
     }
-}
 
 /** Closes handles whose owners are garbage. (java.lang.ref.Cleaner is not there before Android 13.) */
 private object Forgotten {

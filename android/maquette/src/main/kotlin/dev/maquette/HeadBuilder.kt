@@ -110,8 +110,8 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     val photos: List<Photo>
         get() =
             List(nativeStats().photo_count) { index ->
-                val p =
-                    handle.read(maq_head_photo_info()) { it, info -> Native.maq_head_builder_get_photo(it, index, info) }
+                val p = maq_head_photo_info()
+                handle.use { Native.maq_head_builder_get_photo(it, index, p) }
                 val (left, top, right, bottom) = p.box_px
                 Photo(HeadBox(left, top, right, bottom), p.head_coverage, p.is_used != 0, p.focal_px, p.rms_px)
             }
@@ -140,12 +140,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      *   empty or outside of the photo, a focal length that is not positive, more than 64 photos), [Status.UNSUPPORTED] (a
      *   depth image), [Status.CANCELLED] after [cancel].
      */
-    fun addPhoto(
-        photo: Frame,
-        box: HeadBox? = null,
-        rollRad: Float = 0f,
-        focalPx: Float? = null,
-    ) {
+    fun addPhoto(photo: Frame, box: HeadBox? = null, rollRad: Float = 0f, focalPx: Float? = null) {
         // For the C API zeros mean unknown.
         require(box != HeadBox(0f, 0f, 0f, 0f)) { "The box is empty; give the head's, or null to detect it." }
         require(focalPx != 0f) { "The focal length is 0; give the camera's, or null to have it estimated." }

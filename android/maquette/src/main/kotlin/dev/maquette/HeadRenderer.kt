@@ -79,12 +79,7 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
      * @param pitchRad angle above.
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (an angle that is not finite) and [Status.IMAGE_SIZE].
      */
-    fun camera(
-        yawRad: Double = 0.0,
-        pitchRad: Double = 0.0,
-        widthPx: Int = 640,
-        heightPx: Int = 480,
-    ): PinholeCamera =
+    fun camera(yawRad: Double = 0.0, pitchRad: Double = 0.0, widthPx: Int = 640, heightPx: Int = 480): PinholeCamera =
         PinholeCamera.of(
             handle.read(maq_pinhole_camera()) { it, camera ->
                 Native.maq_head_renderer_get_camera(it, yawRad, pitchRad, widthPx, heightPx, camera)

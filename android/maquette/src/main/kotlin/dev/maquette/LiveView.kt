@@ -91,12 +91,7 @@ class LiveView @JvmOverloads constructor(
 
     override fun surfaceCreated(holder: SurfaceHolder) = Unit // surfaceChanged follows
 
-    override fun surfaceChanged(
-        holder: SurfaceHolder,
-        format: Int,
-        width: Int,
-        height: Int,
-    ) {
+    override fun surfaceChanged(holder: SurfaceHolder, format: Int, width: Int, height: Int) {
         preview.use { Android.setSurface(it, holder.surface, width, height) }
         showing?.draw()
     }

@@ -95,13 +95,7 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
                     }
                     desc.stride_bytes = planes.map { it.strideBytes.toLong() }
                 }
-            val id = Callbacks.keep(planes) // until the frame has been released
-            try {
-                Frame(Native.maq_frame_wrap(context, desc, Addresses.ofReleaseCallback(), id))
-            } catch (error: MaquetteException) {
-                Callbacks.release(id)
-                throw error
-            }
+            Callbacks.keep(planes) { Frame(Native.maq_frame_wrap(context, desc, Addresses.ofReleaseCallback(), it)) }
         }
 
     /**

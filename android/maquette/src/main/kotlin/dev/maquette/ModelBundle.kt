@@ -44,10 +44,7 @@ class ModelBundle private constructor(private val folder: String?, private val f
          *
          * @throws IOException if the folder is not there; it says which are.
          */
-        fun ofAssets(
-            assets: AssetManager,
-            folder: String,
-        ): ModelBundle {
+        fun ofAssets(assets: AssetManager, folder: String): ModelBundle {
             val names = assets.list(folder).orEmpty()
             if (MANIFEST !in names) throw IOException("The assets have no $folder/$MANIFEST. ${thoseThere(assets)}")
             return ofBuffers(names.associateWith { mappedOrRead(assets, "$folder/$it") })
@@ -63,10 +60,7 @@ class ModelBundle private constructor(private val folder: String?, private val f
 
         private const val MANIFEST = "manifest.json"
 
-        internal fun mappedOrRead(
-            assets: AssetManager,
-            path: String,
-        ): ByteBuffer =
+        internal fun mappedOrRead(assets: AssetManager, path: String): ByteBuffer =
             try {
                 assets.openFd(path).use { file ->
                     FileInputStream(file.fileDescriptor).use { stream ->

@@ -24,7 +24,7 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
         Changes { state, status, problem -> Change(State.of(state), Status.of(status), problem) }
             .also { it.tell(Change(State.STOPPED, Status.OK, "")) }
     private val handle =
-        handleWithCallback(stateChanges, Native::maq_pipeline_destroy) { id ->
+        handleThatKeeps(stateChanges, Native::maq_pipeline_destroy) { id ->
             val native = config.native()
             native.state_user_data = id
             context.use { Native.maq_pipeline_create(it, native) }
@@ -142,8 +142,8 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
             val model = maq_densepose_model_stats()
             withModel { Native.maq_densepose_model_get_stats(it, model) }
             return Stats(
-                s.result_count, s.dropped_result_count, s.dropped_frame_count, s.results_per_second, s.wait_ms, s.run_ms,
-                s.age_ms.takeIf { it >= 0 }, model.key_frame_interval, model.long_side_px,
+                s.result_count, s.dropped_result_count, s.dropped_frame_count, s.results_per_second, s.wait_ms,
+                s.run_ms, s.age_ms.takeIf { it >= 0 }, model.key_frame_interval, model.long_side_px,
             )
         }
 

@@ -111,8 +111,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      *
      * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image).
      */
-    fun push(frame: Frame) =
-        handle.use { predictor -> frame.handle.use { Native.maq_predictor_push(predictor, it) } }
+    fun push(frame: Frame) = handle.use { predictor -> frame.handle.use { Native.maq_predictor_push(predictor, it) } }
 
     /**
      * Predicts the frame [aheadS] seconds, 0 to 10, after the newest one, in the same size and format. Its timestamp is
@@ -350,18 +349,12 @@ class Novelty internal constructor(
  * [frames] gives the same as a flow.
  */
 class Concealer internal constructor(context: Long, source: Source, config: Config) : AutoCloseable {
-    private val handle: Handle
+    // The garbage collector would stop a source that the app has forgotten.
+    private val handle =
+        handleThatKeeps(source, Native::maq_concealer_destroy) {
+            source.handle.use { Native.maq_concealer_create(context, it, config.native()) }
+        }
     private val isStopped = AtomicBoolean()
-
-    init {
-        val made = source.handle.use { Native.maq_concealer_create(context, it, config.native()) }
-        val id = Callbacks.keep(source) // the garbage collector would stop a source that the app has forgotten
-        handle =
-            Handle(this, made) {
-                Native.maq_concealer_destroy(it)
-                Callbacks.release(id)
-            }
-    }
 
     /**
      * @property maxGapMs the longest gap that is filled, 1 to 10000; 0: 300.
@@ -418,11 +411,13 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
      *   [Config.framePoolSize] frames are open; [Status.INVALID_ARGUMENT] while another thread acquires a frame.
      */
     fun acquireFrame(timeoutMs: Long = WAIT_FOREVER): Frame? {
-        val deadlineNs = if (timeoutMs < 0) Long.MAX_VALUE else System.nanoTime() + nanoseconds(timeoutMs)
+        val beginNs = System.nanoTime()
         return handle.use { concealer ->
             while (!isStopped.get()) {
-                // Nothing else ends a wait than stopping the source.
-                val leftNs = if (timeoutMs < 0) SLICE_NS else (deadlineNs - System.nanoTime()).coerceIn(0, SLICE_NS)
+                // In the C API, only stopping the source ends a wait.
+                val sinceBeginNs = System.nanoTime() - beginNs
+                val leftNs =
+                    if (timeoutMs < 0) SLICE_NS else (nanoseconds(timeoutMs) - sinceBeginNs).coerceIn(0, SLICE_NS)
                 try {
                     return@use Frame(Native.maq_concealer_acquire_frame(concealer, leftNs))
                 } catch (error: MaquetteException) {
@@ -437,8 +432,7 @@ class Concealer internal constructor(context: Long, source: Source, config: Conf
         }
     }
 
-    private fun timeout(timeoutMs: Long) =
-        MaquetteException(Status.TIMEOUT, "No frame came within $timeoutMs ms.")
+    private fun timeout(timeoutMs: Long) = MaquetteException(Status.TIMEOUT, "No frame came within $timeoutMs ms.")
 
     /** Counts and times at this moment. */
     val stats: Stats

@@ -31,8 +31,7 @@ class Recorder internal constructor(
                 it.jpeg_quality = jpegQuality
                 it.keep_predicted = keepPredicted.toInt()
             }
-        fun create(source: Long) =
-            Native.maq_recorder_create(context, textOf(path), source, native)
+        fun create(source: Long) = Native.maq_recorder_create(context, textOf(path), source, native)
         val made = if (source == null) create(0) else source.handle.use(::create)
         handle = Handle(this, made, Native::maq_recorder_destroy)
     }

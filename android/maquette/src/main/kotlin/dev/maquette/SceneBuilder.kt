@@ -132,11 +132,7 @@ class PointCloud(
         private const val POINT_BYTES = 3 * Float.SIZE_BYTES
 
         /** A cloud from an array of x, y, z of each point. */
-        fun of(
-            xyz: FloatArray,
-            origin: List<Double> = listOf(0.0, 0.0, 0.0),
-            up: List<Double>,
-        ): PointCloud {
+        fun of(xyz: FloatArray, origin: List<Double> = listOf(0.0, 0.0, 0.0), up: List<Double>): PointCloud {
             require(xyz.size % 3 == 0) { "The cloud has ${xyz.size} coordinates; each point needs 3." }
             val buffer = ByteBuffer.allocateDirect(maxOf(4 * xyz.size, 1)).order(ByteOrder.nativeOrder())
             buffer.asFloatBuffer().put(xyz)
@@ -176,11 +172,7 @@ class SceneBuilder internal constructor(
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (an invalid camera, or one of another size than the
      *   photo), [Status.CANCELLED], [Status.IMAGE_SIZE], [Status.UNSUPPORTED], [Status.OUT_OF_MEMORY].
      */
-    fun addView(
-        photo: Frame,
-        camera: PinholeCamera,
-        progress: Progress? = null,
-    ): Long =
+    fun addView(photo: Frame, camera: PinholeCamera, progress: Progress? = null): Long =
         handle.use { builder ->
             photo.handle.use { frame ->
                 val seen = Memory(Long.SIZE_BYTES)

@@ -25,10 +25,9 @@ internal fun nanoseconds(timeoutMs: Long): Long =
  * [acquireFrame] and [seek] only one at a time.
  */
 class Source internal constructor(context: Long, uri: String, config: Config) : AutoCloseable {
-    internal val stateChanges =
-        Changes { state, _, reason -> Change(State.entries.first { it.code == state }, reason) }
+    internal val stateChanges = Changes { state, _, reason -> Change(State.entries.first { it.code == state }, reason) }
     internal val handle =
-        handleWithCallback(stateChanges, Native::maq_source_destroy) { id ->
+        handleThatKeeps(stateChanges, Native::maq_source_destroy) { id ->
             val native = config.native()
             native.state_callback = Addresses.ofSourceCallback()
             native.state_user_data = id

@@ -89,10 +89,7 @@ class EdgesTest : AndroidTest() {
                 assertTrue(stats.totalMs > 0 && stats.networkPixels > 0 && stats.threads > 0)
                 TestFiles.inNewFolder { folder ->
                     result.save(File(folder, "box").path)
-                    assertEquals(
-                        setOf("box_distance.png", "box_kind.png", "box_edges.json"),
-                        folder.list()!!.toSet(),
-                    )
+                    assertEquals(setOf("box_distance.png", "box_kind.png", "box_edges.json"), folder.list()!!.toSet())
                 }
             }
         }

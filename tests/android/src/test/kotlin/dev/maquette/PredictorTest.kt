@@ -122,8 +122,7 @@ class PredictorTest : AndroidTest() {
     @Test
     fun samplesDependOnTheSeedAloneAndHaveAnEntropyMap() {
         val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
-        val sampling =
-            Predictor.Config(threads = 1, method = Predictor.Method.SAMPLED, temperature = 1f, seed = -2)
+        val sampling = Predictor.Config(threads = 1, method = Predictor.Method.SAMPLED, temperature = 1f, seed = -2)
         maquette.predictor(networks, sampling).use { predictor ->
             predictor.pushTexture(0..2)
             predictor.sample(3, 2, stepS = 0.1)

@@ -38,9 +38,7 @@ class SceneTest : AndroidTest() {
         val s = sin(angle)
         val f = widthPx.toDouble()
         val intrinsics = Intrinsics(widthPx, heightPx, f, f, 0.5 * (widthPx - 1), 0.5 * (heightPx - 1))
-        return PinholeCamera(
-            intrinsics, listOf(-s, c, 0.0, 0.0, 0.0, -1.0, -c, -s, 0.0), listOf(3 * c, 3 * s, 0.0),
-        )
+        return PinholeCamera(intrinsics, listOf(-s, c, 0.0, 0.0, 0.0, -1.0, -c, -s, 0.0), listOf(3 * c, 3 * s, 0.0))
     }
 
     /** A photo of one colour, blue 40, green 90, red 200. */

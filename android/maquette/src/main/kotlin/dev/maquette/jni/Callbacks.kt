@@ -27,23 +27,27 @@ internal object Callbacks {
         }
     }
 
-    /** Keeps an object for native code until [release]; returns its number. */
-    fun keep(kept: Any): Long = lastId.incrementAndGet().also { objects[it] = kept }
+    /** Keeps an object for the native object that [create] makes, until [release]. [create] gets its number. */
+    fun <T> keep(kept: Any, create: (id: Long) -> T): T {
+        val id = lastId.incrementAndGet()
+        objects[id] = kept
+        try {
+            return create(id)
+        } catch (error: Throwable) {
+            release(id)
+            throw error
+        }
+    }
 
     fun release(id: Long) {
         objects.remove(id)
     }
 
     /**
-     * Runs a call that tells [progress] and [preview]. If one of these throws, the call is cancelled, and this throws the
-     * exception; a result that came nevertheless is discarded.
+     * Runs a call that tells [progress] and [preview]. If one of these throws, the call is cancelled, and this throws
+     * the exception; a result that came nevertheless is discarded.
      */
-    fun <T> during(
-        progress: Progress?,
-        preview: HeadPreview? = null,
-        discard: (T) -> Unit = {},
-        work: () -> T,
-    ): T {
+    fun <T> during(progress: Progress?, preview: HeadPreview? = null, discard: (T) -> Unit = {}, work: () -> T): T {
         val outer = callOfThread.get() // a progress may begin another call
         val call = Call(progress, preview)
         callOfThread.set(call)

@@ -192,163 +192,96 @@ internal object Native {
     @JvmStatic external fun maq_source_stop(source: Long)
 }
 
-internal const val MAQ_CANCELLED = 19
-internal const val MAQ_CLOCK_MEDIA = 1
-internal const val MAQ_CLOCK_MONOTONIC = 2
+internal const val MAQ_CLOCK_MEDIA = 1; internal const val MAQ_CLOCK_MONOTONIC = 2
+internal const val MAQ_DENSEPOSE_CROPS_OFF = 0; internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
 internal const val MAQ_DENSEPOSE_CROPS_ALL = 2
-internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
-internal const val MAQ_DENSEPOSE_CROPS_OFF = 0
-internal const val MAQ_DENSEPOSE_DETAIL_PART = 1
-internal const val MAQ_DENSEPOSE_DETAIL_SURFACE = 0
-internal const val MAQ_DENSEPOSE_PLANE_PART = 1
-internal const val MAQ_DENSEPOSE_PLANE_PERSON = 4
-internal const val MAQ_DENSEPOSE_PLANE_U = 2
-internal const val MAQ_DENSEPOSE_PLANE_V = 3
+internal const val MAQ_DENSEPOSE_DETAIL_SURFACE = 0; internal const val MAQ_DENSEPOSE_DETAIL_PART = 1
+internal const val MAQ_DENSEPOSE_PLANE_PART = 1; internal const val MAQ_DENSEPOSE_PLANE_U = 2
+internal const val MAQ_DENSEPOSE_PLANE_V = 3; internal const val MAQ_DENSEPOSE_PLANE_PERSON = 4
+internal const val MAQ_EDGES_CONVEXITY_UNKNOWN = 0; internal const val MAQ_EDGES_CONVEXITY_CONVEX = 1
 internal const val MAQ_EDGES_CONVEXITY_CONCAVE = 2
-internal const val MAQ_EDGES_CONVEXITY_CONVEX = 1
-internal const val MAQ_EDGES_CONVEXITY_UNKNOWN = 0
-internal const val MAQ_EDGES_CURVE_ARC = 1
-internal const val MAQ_EDGES_CURVE_LINE = 0
+internal const val MAQ_EDGES_CURVE_LINE = 0; internal const val MAQ_EDGES_CURVE_ARC = 1
 internal const val MAQ_EDGES_CURVE_SPLINE = 2
+internal const val MAQ_EDGES_KIND_NONE = 0; internal const val MAQ_EDGES_KIND_CREASE = 1
 internal const val MAQ_EDGES_KIND_BOUNDARY = 2
-internal const val MAQ_EDGES_KIND_CREASE = 1
-internal const val MAQ_EDGES_KIND_NONE = 0
-internal const val MAQ_EDGES_PLANE_DEPTH = 4
-internal const val MAQ_EDGES_PLANE_DISTANCE = 1
-internal const val MAQ_EDGES_PLANE_EXPECTED_ERROR = 2
-internal const val MAQ_EDGES_PLANE_KIND = 3
-internal const val MAQ_EDGES_SNAP_CORNER = 1
-internal const val MAQ_EDGES_SNAP_CURVE = 2
-internal const val MAQ_EDGES_SNAP_NOTHING = 0
-internal const val MAQ_EDGES_SNAP_PLANE = 3
-internal const val MAQ_END_OF_STREAM = 13
-internal const val MAQ_ERROR_BAD_BUNDLE = 6
-internal const val MAQ_ERROR_BUSY = 16
-internal const val MAQ_ERROR_DEVICE_LOST = 15
-internal const val MAQ_ERROR_IMAGE_SIZE = 5
-internal const val MAQ_ERROR_INFERENCE = 10
-internal const val MAQ_ERROR_INTERNAL = 12
-internal const val MAQ_ERROR_INVALID_ARGUMENT = 1
-internal const val MAQ_ERROR_NOT_FOUND = 3
-internal const val MAQ_ERROR_NO_PERMISSION = 17
-internal const val MAQ_ERROR_OUT_OF_MEMORY = 11
-internal const val MAQ_ERROR_POOL_EMPTY = 9
-internal const val MAQ_ERROR_RUNTIME_LIBRARY = 8
-internal const val MAQ_ERROR_UNREADABLE = 4
-internal const val MAQ_ERROR_UNSUPPORTED = 7
-internal const val MAQ_ERROR_UNWRITABLE = 18
-internal const val MAQ_ERROR_VERSION_MISMATCH = 2
+internal const val MAQ_EDGES_PLANE_DISTANCE = 1; internal const val MAQ_EDGES_PLANE_EXPECTED_ERROR = 2
+internal const val MAQ_EDGES_PLANE_KIND = 3; internal const val MAQ_EDGES_PLANE_DEPTH = 4
+internal const val MAQ_EDGES_SNAP_NOTHING = 0; internal const val MAQ_EDGES_SNAP_CORNER = 1
+internal const val MAQ_EDGES_SNAP_CURVE = 2; internal const val MAQ_EDGES_SNAP_PLANE = 3
 internal const val MAQ_FRAME_CAPTURED = 1
-internal const val MAQ_HEADER_VERSION = 300
-internal const val MAQ_HEAD_ALL_TRIANGLES = -1
+internal const val MAQ_HEAD_SCALE_PRIOR = 0; internal const val MAQ_HEAD_SCALE_GIVEN = 1
 internal const val MAQ_HEAD_SCALE_DEPTH = 2
-internal const val MAQ_HEAD_SCALE_GIVEN = 1
-internal const val MAQ_HEAD_SCALE_PRIOR = 0
-internal const val MAQ_HEAD_SHADING_COLOUR = 0
+internal const val MAQ_HEAD_SHADING_COLOUR = 0; internal const val MAQ_HEAD_SHADING_SHAPE = 1
+internal const val MAQ_HEAD_SHADING_NORMALS = 2; internal const val MAQ_HEAD_SHADING_TEMPLATE = 3
 internal const val MAQ_HEAD_SHADING_DEPTH = 4
-internal const val MAQ_HEAD_SHADING_NORMALS = 2
-internal const val MAQ_HEAD_SHADING_SHAPE = 1
-internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1
-internal const val MAQ_HEAD_SHADING_TEMPLATE = 3
-internal const val MAQ_HEAD_TEXTURE_DEFAULT = 0
-internal const val MAQ_HEAD_TEXTURE_OFF = 1
+internal const val MAQ_HEAD_TEXTURE_DEFAULT = 0; internal const val MAQ_HEAD_TEXTURE_OFF = 1
 internal const val MAQ_HEAD_TEXTURE_ON = 2
-internal const val MAQ_HEAD_TOPOLOGY_FIELD = 0
-internal const val MAQ_HEAD_TOPOLOGY_TEMPLATE = 1
-internal const val MAQ_IMAGE_ALPHA_OFF = 0
-internal const val MAQ_IMAGE_ALPHA_ON = 1
-internal const val MAQ_IMAGE_PLANE_ALPHA = 2
-internal const val MAQ_IMAGE_PLANE_BGR = 1
-internal const val MAQ_IMAGE_PLANE_DEPTH = 3
-internal const val MAQ_IMAGE_PLANE_NORMALS = 4
+internal const val MAQ_HEAD_TOPOLOGY_FIELD = 0; internal const val MAQ_HEAD_TOPOLOGY_TEMPLATE = 1
+internal const val MAQ_IMAGE_ALPHA_OFF = 0; internal const val MAQ_IMAGE_ALPHA_ON = 1
+internal const val MAQ_IMAGE_PLANE_BGR = 1; internal const val MAQ_IMAGE_PLANE_ALPHA = 2
+internal const val MAQ_IMAGE_PLANE_DEPTH = 3; internal const val MAQ_IMAGE_PLANE_NORMALS = 4
 internal const val MAQ_IMAGE_PLANE_TEMPLATE_POINTS = 5
-internal const val MAQ_LOG_DEBUG = 4
-internal const val MAQ_LOG_ERROR = 1
-internal const val MAQ_LOG_INFO = 3
-internal const val MAQ_LOG_OFF = -1
-internal const val MAQ_LOG_WARNING = 2
-internal const val MAQ_NOVELTY_AUTO = 0
-internal const val MAQ_NOVELTY_BIGRAM = 1
-internal const val MAQ_OK = 0
-internal const val MAQ_PIPELINE_ENDED = 7
+internal const val MAQ_LOG_OFF = -1; internal const val MAQ_LOG_ERROR = 1; internal const val MAQ_LOG_WARNING = 2
+internal const val MAQ_LOG_INFO = 3; internal const val MAQ_LOG_DEBUG = 4
+internal const val MAQ_NOVELTY_AUTO = 0; internal const val MAQ_NOVELTY_BIGRAM = 1
+internal const val MAQ_PIPELINE_STOPPED = 0; internal const val MAQ_PIPELINE_OPENING = 1
+internal const val MAQ_PIPELINE_LOADING = 2; internal const val MAQ_PIPELINE_RUNNING = 3
+internal const val MAQ_PIPELINE_PAUSED = 4; internal const val MAQ_PIPELINE_STALLED = 5
+internal const val MAQ_PIPELINE_RECONNECTING = 6; internal const val MAQ_PIPELINE_ENDED = 7
 internal const val MAQ_PIPELINE_FAILED = 8
-internal const val MAQ_PIPELINE_LOADING = 2
-internal const val MAQ_PIPELINE_OPENING = 1
-internal const val MAQ_PIPELINE_PAUSED = 4
-internal const val MAQ_PIPELINE_RECONNECTING = 6
-internal const val MAQ_PIPELINE_RUNNING = 3
-internal const val MAQ_PIPELINE_STALLED = 5
-internal const val MAQ_PIPELINE_STOPPED = 0
-internal const val MAQ_PIXEL_BGR8 = 2
-internal const val MAQ_PIXEL_DEPTH16 = 7
-internal const val MAQ_PIXEL_DEPTH32F = 8
-internal const val MAQ_PIXEL_GREY8 = 4
-internal const val MAQ_PIXEL_NV12 = 5
-internal const val MAQ_PIXEL_RGB8 = 1
-internal const val MAQ_PIXEL_RGBA8 = 3
-internal const val MAQ_PIXEL_YUYV = 6
-internal const val MAQ_PREDICTOR_AUTO = 0
-internal const val MAQ_PREDICTOR_LAST = 1
-internal const val MAQ_PREDICTOR_MOTION = 2
-internal const val MAQ_PREDICTOR_REFINED = 3
+internal const val MAQ_PIXEL_RGB8 = 1; internal const val MAQ_PIXEL_BGR8 = 2; internal const val MAQ_PIXEL_RGBA8 = 3
+internal const val MAQ_PIXEL_GREY8 = 4; internal const val MAQ_PIXEL_NV12 = 5; internal const val MAQ_PIXEL_YUYV = 6
+internal const val MAQ_PIXEL_DEPTH16 = 7; internal const val MAQ_PIXEL_DEPTH32F = 8
+internal const val MAQ_PREDICTOR_AUTO = 0; internal const val MAQ_PREDICTOR_LAST = 1
+internal const val MAQ_PREDICTOR_MOTION = 2; internal const val MAQ_PREDICTOR_REFINED = 3
 internal const val MAQ_PREDICTOR_SAMPLED = 4
-internal const val MAQ_PROVIDER_CPU = 0
+internal const val MAQ_PROVIDER_CPU = 0; internal const val MAQ_PROVIDER_XNNPACK = 1
 internal const val MAQ_PROVIDER_NNAPI = 2
-internal const val MAQ_PROVIDER_XNNPACK = 1
-internal const val MAQ_SCENE_LONG_SIDE_FULL = -1
-internal const val MAQ_SCENE_VARIATION_ALL = -1
-internal const val MAQ_SOURCE_CONTROL_AUTO_EXPOSURE = 1
-internal const val MAQ_SOURCE_CONTROL_AUTO_FOCUS = 4
-internal const val MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE = 6
-internal const val MAQ_SOURCE_CONTROL_BRIGHTNESS = 8
-internal const val MAQ_SOURCE_CONTROL_EXPOSURE = 2
-internal const val MAQ_SOURCE_CONTROL_FOCUS = 5
-internal const val MAQ_SOURCE_CONTROL_GAIN = 3
-internal const val MAQ_SOURCE_CONTROL_WHITE_BALANCE = 7
-internal const val MAQ_SOURCE_LOST = 3
+internal const val MAQ_SOURCE_CONTROL_AUTO_EXPOSURE = 1; internal const val MAQ_SOURCE_CONTROL_EXPOSURE = 2
+internal const val MAQ_SOURCE_CONTROL_GAIN = 3; internal const val MAQ_SOURCE_CONTROL_AUTO_FOCUS = 4
+internal const val MAQ_SOURCE_CONTROL_FOCUS = 5; internal const val MAQ_SOURCE_CONTROL_AUTO_WHITE_BALANCE = 6
+internal const val MAQ_SOURCE_CONTROL_WHITE_BALANCE = 7; internal const val MAQ_SOURCE_CONTROL_BRIGHTNESS = 8
+internal const val MAQ_SOURCE_STARTED = 1; internal const val MAQ_SOURCE_STALLED = 2
+internal const val MAQ_SOURCE_LOST = 3; internal const val MAQ_SOURCE_RECONNECTING = 4
 internal const val MAQ_SOURCE_RECONNECTED = 5
-internal const val MAQ_SOURCE_RECONNECTING = 4
-internal const val MAQ_SOURCE_STALLED = 2
-internal const val MAQ_SOURCE_STARTED = 1
-internal const val MAQ_SPINNING_DEFAULT = 0
+internal const val MAQ_SPINNING_DEFAULT = 0; internal const val MAQ_SPINNING_ON = 1
 internal const val MAQ_SPINNING_OFF = 2
-internal const val MAQ_SPINNING_ON = 1
-internal const val MAQ_THREADS_MEASURED = -1
-internal const val MAQ_TIMEOUT = 14
+internal const val MAQ_OK = 0; internal const val MAQ_ERROR_INVALID_ARGUMENT = 1
+internal const val MAQ_ERROR_VERSION_MISMATCH = 2; internal const val MAQ_ERROR_NOT_FOUND = 3
+internal const val MAQ_ERROR_UNREADABLE = 4; internal const val MAQ_ERROR_IMAGE_SIZE = 5
+internal const val MAQ_ERROR_BAD_BUNDLE = 6; internal const val MAQ_ERROR_UNSUPPORTED = 7
+internal const val MAQ_ERROR_RUNTIME_LIBRARY = 8; internal const val MAQ_ERROR_POOL_EMPTY = 9
+internal const val MAQ_ERROR_INFERENCE = 10; internal const val MAQ_ERROR_OUT_OF_MEMORY = 11
+internal const val MAQ_ERROR_INTERNAL = 12; internal const val MAQ_END_OF_STREAM = 13
+internal const val MAQ_TIMEOUT = 14; internal const val MAQ_ERROR_DEVICE_LOST = 15
+internal const val MAQ_ERROR_BUSY = 16; internal const val MAQ_ERROR_NO_PERMISSION = 17
+internal const val MAQ_ERROR_UNWRITABLE = 18; internal const val MAQ_CANCELLED = 19
+internal const val MAQ_HEADER_VERSION = 300; internal const val MAQ_HEAD_ALL_TRIANGLES = -1
+internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1; internal const val MAQ_SCENE_LONG_SIDE_FULL = -1
+internal const val MAQ_SCENE_VARIATION_ALL = -1; internal const val MAQ_THREADS_MEASURED = -1
 internal const val MAQ_WAIT_FOREVER = -1
 
 internal class maq_camera_info(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val uri get() = Pointer(this, 8)
-    val name get() = Pointer(this, 16)
-    val bus get() = Pointer(this, 24)
-    val status get() = int(32)
-    val problem get() = Pointer(this, 40)
-    val mode_count get() = int(48)
+    val uri get() = Pointer(this, 8); val name get() = Pointer(this, 16); val bus get() = Pointer(this, 24)
+    val status get() = int(32); val problem get() = Pointer(this, 40); val mode_count get() = int(48)
 }
 
 internal class maq_camera_mode(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val format get() = text(4, 8)
-    val is_usable get() = int(12)
-    val width_px get() = int(16)
-    val height_px get() = int(20)
-    val fps get() = double(24)
+    val format get() = text(4, 8); val is_usable get() = int(12); val width_px get() = int(16)
+    val height_px get() = int(20); val fps get() = double(24)
 }
 
 internal class maq_capture_drop(outer: Memory? = null, at: Int = 0) : Struct(24, outer, at) {
-    val reason get() = Pointer(this, 8)
-    val count get() = long(16)
+    val reason get() = Pointer(this, 8); val count get() = long(16)
 }
 
 internal class maq_capture_info(outer: Memory? = null, at: Int = 0) : Struct(48, outer, at) {
-    val view_count get() = int(4)
-    val point_count get() = long(8)
-    val drop_count get() = int(16)
+    val view_count get() = int(4); val point_count get() = long(8); val drop_count get() = int(16)
     val up get() = doubles(24, 3)
 }
 
 internal class maq_intrinsics(outer: Memory? = null, at: Int = 0) : Memory(104, outer, at) {
-    var width_px: Int get() = int(0); set(v) = int(0, v)
-    var height_px: Int get() = int(4); set(v) = int(4, v)
+    var width_px: Int get() = int(0); set(v) = int(0, v); var height_px: Int get() = int(4); set(v) = int(4, v)
     var fx_px: Double get() = double(8); set(v) = double(8, v)
     var fy_px: Double get() = double(16); set(v) = double(16, v)
     var cx_px: Double get() = double(24); set(v) = double(24, v)
@@ -363,127 +296,86 @@ internal class maq_pinhole_camera(outer: Memory? = null, at: Int = 0) : Struct(2
 }
 
 internal class maq_capture_view(outer: Memory? = null, at: Int = 0) : Struct(232, outer, at) {
-    val is_held_out get() = int(4)
-    val name get() = Pointer(this, 8)
-    val camera = maq_pinhole_camera(this, 16)
+    val is_held_out get() = int(4); val name get() = Pointer(this, 8); val camera = maq_pinhole_camera(this, 16)
 }
 
 internal class maq_concealer_config(outer: Memory? = null, at: Int = 0) : Struct(20, outer, at) {
-    var max_gap_ms: Int get() = int(4); set(v) = int(4, v)
-    var threads: Int get() = int(8); set(v) = int(8, v)
-    var method: Int get() = int(12); set(v) = int(12, v)
-    var frame_pool_size: Int get() = int(16); set(v) = int(16, v)
+    var max_gap_ms: Int get() = int(4); set(v) = int(4, v); var threads: Int get() = int(8); set(v) = int(8, v)
+    var method: Int get() = int(12); set(v) = int(12, v); var frame_pool_size: Int get() = int(16); set(v) = int(16, v)
 }
 
 internal class maq_concealer_stats(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val captured_count get() = long(8)
-    val predicted_count get() = long(16)
-    val late_count get() = long(24)
-    val dropped_count get() = long(32)
-    val latest_gap_ms get() = float(40).toDouble()
-    val latest_wait_ms get() = float(44).toDouble()
-    val max_wait_ms get() = float(48).toDouble()
+    val captured_count get() = long(8); val predicted_count get() = long(16); val late_count get() = long(24)
+    val dropped_count get() = long(32); val latest_gap_ms get() = float(40).toDouble()
+    val latest_wait_ms get() = float(44).toDouble(); val max_wait_ms get() = float(48).toDouble()
 }
 
 internal class maq_context_config(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    var log_level: Int get() = int(4); set(v) = int(4, v)
-    var log_callback: Long get() = long(8); set(v) = long(8, v)
+    var log_level: Int get() = int(4); set(v) = int(4, v); var log_callback: Long get() = long(8); set(v) = long(8, v)
     val onnxruntime_library get() = Pointer(this, 24)
 }
 
 internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32, outer, at) {
-    var threads: Int get() = int(0); set(v) = int(0, v)
-    var spinning: Int get() = int(4); set(v) = int(4, v)
+    var threads: Int get() = int(0); set(v) = int(0, v); var spinning: Int get() = int(4); set(v) = int(4, v)
     var provider: Int get() = int(8); set(v) = int(8, v)
-    var bundle_file_count: Int get() = int(12); set(v) = int(12, v)
-    val bundle_path get() = Pointer(this, 16)
+    var bundle_file_count: Int get() = int(12); set(v) = int(12, v); val bundle_path get() = Pointer(this, 16)
     val bundle_files get() = Pointer(this, 24)
 }
 
 internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(80, outer, at) {
-    val model = maq_model_options(this, 8)
-    var long_side_px: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var long_side_px: Int get() = int(40); set(v) = int(40, v)
     var score_threshold: Float get() = float(44); set(v) = float(44, v)
     var max_people: Int get() = int(48); set(v) = int(48, v)
     var max_proposals: Int get() = int(52); set(v) = int(52, v)
     var key_frame_interval: Int get() = int(56); set(v) = int(56, v)
     var min_person_height_px: Int get() = int(60); set(v) = int(60, v)
-    var detail: Int get() = int(64); set(v) = int(64, v)
-    var person_crops: Int get() = int(68); set(v) = int(68, v)
+    var detail: Int get() = int(64); set(v) = int(64, v); var person_crops: Int get() = int(68); set(v) = int(68, v)
     var person_crop_px: Int get() = int(72); set(v) = int(72, v)
     var result_pool_size: Int get() = int(76); set(v) = int(76, v)
 }
 
 internal class maq_densepose_model_stats(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {
-    val key_frame_interval get() = int(4)
-    val long_side_px get() = int(8)
+    val key_frame_interval get() = int(4); val long_side_px get() = int(8)
 }
 
 internal class maq_densepose_person(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val score get() = float(4)
-    val box_px get() = floats(8, 4)
-    val id get() = long(24)
+    val score get() = float(4); val box_px get() = floats(8, 4); val id get() = long(24)
 }
 
 internal class maq_densepose_stats(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {
-    val preprocess_ms get() = float(4).toDouble()
-    val trunk_ms get() = float(8).toDouble()
-    val proposals_ms get() = float(12).toDouble()
-    val box_head_ms get() = float(16).toDouble()
-    val dense_head_ms get() = float(20).toDouble()
-    val crops_ms get() = float(24).toDouble()
-    val decode_ms get() = float(28).toDouble()
-    val total_ms get() = float(32).toDouble()
-    val network_width_px get() = int(36)
-    val network_height_px get() = int(40)
-    val proposal_count get() = int(44)
-    val person_count get() = int(48)
-    val crop_count get() = int(52)
-    val dropped_box_count get() = int(56)
-    val body_pixel_count get() = long(64)
-    val clamped_pixel_count get() = long(72)
-    val is_key_frame get() = int(80)
-    val provider get() = int(84)
-    val threads get() = int(88)
-    val is_threads_measured get() = int(92)
+    val preprocess_ms get() = float(4).toDouble(); val trunk_ms get() = float(8).toDouble()
+    val proposals_ms get() = float(12).toDouble(); val box_head_ms get() = float(16).toDouble()
+    val dense_head_ms get() = float(20).toDouble(); val crops_ms get() = float(24).toDouble()
+    val decode_ms get() = float(28).toDouble(); val total_ms get() = float(32).toDouble()
+    val network_width_px get() = int(36); val network_height_px get() = int(40); val proposal_count get() = int(44)
+    val person_count get() = int(48); val crop_count get() = int(52); val dropped_box_count get() = int(56)
+    val body_pixel_count get() = long(64); val clamped_pixel_count get() = long(72); val is_key_frame get() = int(80)
+    val provider get() = int(84); val threads get() = int(88); val is_threads_measured get() = int(92)
 }
 
 internal class maq_densepose_surface(outer: Memory? = null, at: Int = 0) : Struct(16, outer, at) {
-    val nodes get() = int(4)
-    val points_m get() = Pointer(this, 8)
+    val nodes get() = int(4); val points_m get() = Pointer(this, 8)
 }
 
 internal class maq_edges_box(outer: Memory? = null, at: Int = 0) : Struct(152, outer, at) {
-    val corner_count get() = int(4)
-    val size_m get() = doubles(8, 3)
-    val size_tolerance_m get() = doubles(32, 3)
-    val axes get() = doubles(56, 9)
-    val centre_m get() = doubles(128, 3)
+    val corner_count get() = int(4); val size_m get() = doubles(8, 3); val size_tolerance_m get() = doubles(32, 3)
+    val axes get() = doubles(56, 9); val centre_m get() = doubles(128, 3)
 }
 
 internal class maq_edges_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val model = maq_model_options(this, 8)
-    var result_pool_size: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var result_pool_size: Int get() = int(40); set(v) = int(40, v)
     var skip_planes: Int get() = int(44); set(v) = int(44, v)
     var average_frames: Int get() = int(48); set(v) = int(48, v)
 }
 
 internal class maq_edges_corner(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val curve_count get() = int(4)
-    val point_m get() = doubles(8, 3)
+    val curve_count get() = int(4); val point_m get() = doubles(8, 3)
 }
 
 internal class maq_edges_curve(outer: Memory? = null, at: Int = 0) : Struct(232, outer, at) {
-    val type get() = int(4)
-    val kind get() = int(8)
-    val convexity get() = int(12)
-    val is_closed get() = int(16)
-    val corners get() = ints(20, 2)
-    val length_m get() = double(32)
-    val rms_footprints get() = double(40)
-    val points_m get() = Pointer(this, 48)
-    val point_count get() = int(56)
-    val centre_m get() = doubles(72, 3)
+    val type get() = int(4); val kind get() = int(8); val convexity get() = int(12); val is_closed get() = int(16)
+    val corners get() = ints(20, 2); val length_m get() = double(32); val rms_footprints get() = double(40)
+    val points_m get() = Pointer(this, 48); val point_count get() = int(56); val centre_m get() = doubles(72, 3)
 }
 
 internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
@@ -497,75 +389,50 @@ internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Str
 }
 
 internal class maq_edges_curves_stats(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    val curves_ms get() = float(4).toDouble()
-    val boxes_ms get() = float(8).toDouble()
+    val curves_ms get() = float(4).toDouble(); val boxes_ms get() = float(8).toDouble()
 }
 
 internal class maq_edges_field(outer: Memory? = null, at: Int = 0) : Struct(120, outer, at) {
-    val width_px get() = int(4)
-    val height_px get() = int(8)
-    val eps_r get() = float(12)
+    val width_px get() = int(4); val height_px get() = int(8); val eps_r get() = float(12)
     val intrinsics = maq_intrinsics(this, 16)
 }
 
 internal class maq_edges_snap(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val target get() = int(4)
-    val index get() = int(8)
-    val point_m get() = doubles(16, 3)
+    val target get() = int(4); val index get() = int(8); val point_m get() = doubles(16, 3)
     val distance_px get() = double(40)
 }
 
 internal class maq_edges_stats(outer: Memory? = null, at: Int = 0) : Struct(80, outer, at) {
-    val depth_ms get() = float(4).toDouble()
-    val skip_ms get() = float(8).toDouble()
-    val slopes_ms get() = float(12).toDouble()
-    val network_ms get() = float(16).toDouble()
-    val decode_ms get() = float(20).toDouble()
-    val total_ms get() = float(24).toDouble()
-    val known_pixel_count get() = long(32)
-    val network_pixel_count get() = long(40)
-    val broken_pixel_count get() = long(48)
-    val provider get() = int(56)
-    val threads get() = int(60)
-    val is_threads_measured get() = int(64)
-    val averaged_pixel_count get() = long(72)
+    val depth_ms get() = float(4).toDouble(); val skip_ms get() = float(8).toDouble()
+    val slopes_ms get() = float(12).toDouble(); val network_ms get() = float(16).toDouble()
+    val decode_ms get() = float(20).toDouble(); val total_ms get() = float(24).toDouble()
+    val known_pixel_count get() = long(32); val network_pixel_count get() = long(40)
+    val broken_pixel_count get() = long(48); val provider get() = int(56); val threads get() = int(60)
+    val is_threads_measured get() = int(64); val averaged_pixel_count get() = long(72)
 }
 
 internal class maq_frame_desc(outer: Memory? = null, at: Int = 0) : Struct(176, outer, at) {
-    var format: Int get() = int(4); set(v) = int(4, v)
-    var width_px: Int get() = int(8); set(v) = int(8, v)
-    var height_px: Int get() = int(12); set(v) = int(12, v)
-    val planes get() = pointers(16, 2)
+    var format: Int get() = int(4); set(v) = int(4, v); var width_px: Int get() = int(8); set(v) = int(8, v)
+    var height_px: Int get() = int(12); set(v) = int(12, v); val planes get() = pointers(16, 2)
     var stride_bytes: List<Long> get() = longs(32, 2); set(v) = longs(32, v)
-    var timestamp_ns: Long get() = long(48); set(v) = long(48, v)
-    var clock: Int get() = int(56); set(v) = int(56, v)
-    var sequence: Long get() = long(64); set(v) = long(64, v)
-    val intrinsics = maq_intrinsics(this, 72)
+    var timestamp_ns: Long get() = long(48); set(v) = long(48, v); var clock: Int get() = int(56); set(v) = int(56, v)
+    var sequence: Long get() = long(64); set(v) = long(64, v); val intrinsics = maq_intrinsics(this, 72)
 }
 
 internal class maq_frame_origin(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    val kind get() = int(4)
-    val horizon_ns get() = long(8)
-    val age_ns get() = long(16)
-    val captured_timestamp_ns get() = long(24)
-    val captured_sequence get() = long(32)
+    val kind get() = int(4); val horizon_ns get() = long(8); val age_ns get() = long(16)
+    val captured_timestamp_ns get() = long(24); val captured_sequence get() = long(32)
 }
 
 internal class maq_head_build_stats(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    val photo_count get() = int(4)
-    val used_photo_count get() = int(8)
-    val encode_ms get() = float(12).toDouble()
-    val pose_ms get() = float(16).toDouble()
-    val fit_ms get() = float(20).toDouble()
-    val total_ms get() = float(24).toDouble()
-    val step_count get() = int(28)
-    val provider get() = int(32)
+    val photo_count get() = int(4); val used_photo_count get() = int(8); val encode_ms get() = float(12).toDouble()
+    val pose_ms get() = float(16).toDouble(); val fit_ms get() = float(20).toDouble()
+    val total_ms get() = float(24).toDouble(); val step_count get() = int(28); val provider get() = int(32)
     val threads get() = int(36)
 }
 
 internal class maq_head_builder_config(outer: Memory? = null, at: Int = 0) : Struct(72, outer, at) {
-    val model = maq_model_options(this, 8)
-    var texture: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var texture: Int get() = int(40); set(v) = int(40, v)
     var texture_px: Int get() = int(44); set(v) = int(44, v)
     var mirror_unseen: Int get() = int(48); set(v) = int(48, v)
     var delight_texture: Int get() = int(52); set(v) = int(52, v)
@@ -573,44 +440,31 @@ internal class maq_head_builder_config(outer: Memory? = null, at: Int = 0) : Str
 }
 
 internal class maq_head_info(outer: Memory? = null, at: Int = 0) : Struct(24, outer, at) {
-    val photo_count get() = int(4)
-    val landmark_count get() = int(8)
-    val scale get() = int(12)
-    val scale_sigma get() = float(16)
-    val texture_px get() = int(20)
+    val photo_count get() = int(4); val landmark_count get() = int(8); val scale get() = int(12)
+    val scale_sigma get() = float(16); val texture_px get() = int(20)
 }
 
 internal class maq_head_landmark(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val sigma_m get() = float(4)
-    val point_m get() = doubles(8, 3)
+    val sigma_m get() = float(4); val point_m get() = doubles(8, 3)
 }
 
 internal class maq_head_mesh_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val model = maq_model_options(this, 8)
-    var topology: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var topology: Int get() = int(40); set(v) = int(40, v)
     var triangle_count: Int get() = int(44); set(v) = int(44, v)
     var cell_m: Double get() = double(48); set(v) = double(48, v)
 }
 
 internal class maq_head_mesh_data(outer: Memory? = null, at: Int = 0) : Struct(80, outer, at) {
-    val vertex_count get() = int(4)
-    val triangle_count get() = int(8)
-    val morph_target_count get() = int(12)
-    val positions_m get() = Pointer(this, 16)
-    val normals get() = Pointer(this, 24)
-    val colours_rgb get() = Pointer(this, 32)
-    val template_points_m get() = Pointer(this, 40)
-    val triangles get() = Pointer(this, 48)
-    val texture_coordinates get() = Pointer(this, 56)
-    val texture_jpeg get() = Pointer(this, 64)
-    val texture_bytes get() = int(72)
+    val vertex_count get() = int(4); val triangle_count get() = int(8); val morph_target_count get() = int(12)
+    val positions_m get() = Pointer(this, 16); val normals get() = Pointer(this, 24)
+    val colours_rgb get() = Pointer(this, 32); val template_points_m get() = Pointer(this, 40)
+    val triangles get() = Pointer(this, 48); val texture_coordinates get() = Pointer(this, 56)
+    val texture_jpeg get() = Pointer(this, 64); val texture_bytes get() = int(72)
     val simplification_error_m get() = float(76)
 }
 
 internal class maq_head_morph_target(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val vertex_count get() = int(4)
-    val name get() = Pointer(this, 8)
-    val vertices get() = Pointer(this, 16)
+    val vertex_count get() = int(4); val name get() = Pointer(this, 8); val vertices get() = Pointer(this, 16)
     val deltas_m get() = Pointer(this, 24)
 }
 
@@ -621,16 +475,12 @@ internal class maq_head_photo(outer: Memory? = null, at: Int = 0) : Struct(28, o
 }
 
 internal class maq_head_photo_info(outer: Memory? = null, at: Int = 0) : Struct(36, outer, at) {
-    val box_px get() = floats(4, 4)
-    val head_coverage get() = float(20)
-    val is_used get() = int(24)
-    val focal_px get() = float(28)
-    val rms_px get() = float(32)
+    val box_px get() = floats(4, 4); val head_coverage get() = float(20); val is_used get() = int(24)
+    val focal_px get() = float(28); val rms_px get() = float(32)
 }
 
 internal class maq_head_renderer_config(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    var threads: Int get() = int(4); set(v) = int(4, v)
-    var near_m: Double get() = double(8); set(v) = double(8, v)
+    var threads: Int get() = int(4); set(v) = int(4, v); var near_m: Double get() = double(8); set(v) = double(8, v)
     var shading: Int get() = int(16); set(v) = int(16, v)
     var shading_strength: Float get() = float(20); set(v) = float(20, v)
     var disable_antialiasing: Int get() = int(24); set(v) = int(24, v)
@@ -640,121 +490,84 @@ internal class maq_head_renderer_config(outer: Memory? = null, at: Int = 0) : St
 }
 
 internal class maq_memory_file(outer: Memory? = null, at: Int = 0) : Memory(24, outer, at) {
-    val name get() = Pointer(this, 0)
-    val data get() = Pointer(this, 8)
+    val name get() = Pointer(this, 0); val data get() = Pointer(this, 8)
     var size_bytes: Long get() = long(16); set(v) = long(16, v)
 }
 
 internal class maq_novelty_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val model = maq_model_options(this, 8)
-    var method: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
     var event_ratio: Float get() = float(44); set(v) = float(44, v)
     var shared_with: Long get() = long(48); set(v) = long(48, v)
 }
 
 internal class maq_novelty_score(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val columns get() = int(4)
-    val rows get() = int(8)
-    val bits get() = float(12)
-    val ratio get() = float(16)
-    val is_event get() = int(20)
-    val is_cut get() = int(24)
-    val is_stream_start get() = int(28)
+    val columns get() = int(4); val rows get() = int(8); val bits get() = float(12); val ratio get() = float(16)
+    val is_event get() = int(20); val is_cut get() = int(24); val is_stream_start get() = int(28)
 }
 
 internal class maq_novelty_stats(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val resize_ms get() = float(4).toDouble()
-    val network_ms get() = float(8).toDouble()
-    val nearest_ms get() = float(12).toDouble()
-    val transformer_ms get() = float(16).toDouble()
-    val push_ms get() = float(20).toDouble()
-    val threads get() = int(24)
-    val pushed_count get() = long(32)
-    val event_count get() = long(40)
-    val stream_start_count get() = long(48)
+    val resize_ms get() = float(4).toDouble(); val network_ms get() = float(8).toDouble()
+    val nearest_ms get() = float(12).toDouble(); val transformer_ms get() = float(16).toDouble()
+    val push_ms get() = float(20).toDouble(); val threads get() = int(24); val pushed_count get() = long(32)
+    val event_count get() = long(40); val stream_start_count get() = long(48)
 }
 
 internal class maq_pipeline_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    var result_pool_size: Int get() = int(4); set(v) = int(4, v)
-    val source get() = Pointer(this, 8)
+    var result_pool_size: Int get() = int(4); set(v) = int(4, v); val source get() = Pointer(this, 8)
     var state_callback: Long get() = long(32); set(v) = long(32, v)
-    var state_user_data: Long get() = long(40); set(v) = long(40, v)
-    var nice: Int get() = int(48); set(v) = int(48, v)
+    var state_user_data: Long get() = long(40); set(v) = long(40, v); var nice: Int get() = int(48); set(v) = int(48, v)
 }
 
 internal class maq_pipeline_info(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val state get() = int(4)
-    val status get() = int(8)
-    val problem get() = Pointer(this, 16)
+    val state get() = int(4); val status get() = int(8); val problem get() = Pointer(this, 16)
     val source_uri get() = Pointer(this, 24)
 }
 
 internal class maq_pipeline_result_stats(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    val number get() = long(8)
-    val wait_ms get() = double(16)
-    val run_ms get() = double(24)
+    val number get() = long(8); val wait_ms get() = double(16); val run_ms get() = double(24)
     val age_ms get() = double(32)
 }
 
 internal class maq_pipeline_stats(outer: Memory? = null, at: Int = 0) : Struct(64, outer, at) {
-    val result_count get() = long(8)
-    val dropped_result_count get() = long(16)
-    val dropped_frame_count get() = long(24)
-    val results_per_second get() = double(32)
-    val wait_ms get() = double(40)
-    val run_ms get() = double(48)
-    val age_ms get() = double(56)
+    val result_count get() = long(8); val dropped_result_count get() = long(16)
+    val dropped_frame_count get() = long(24); val results_per_second get() = double(32); val wait_ms get() = double(40)
+    val run_ms get() = double(48); val age_ms get() = double(56)
 }
 
 internal class maq_point_cloud(outer: Memory? = null, at: Int = 0) : Struct(72, outer, at) {
-    var point_count: Long get() = long(8); set(v) = long(8, v)
-    val xyz get() = Pointer(this, 16)
+    var point_count: Long get() = long(8); set(v) = long(8, v); val xyz get() = Pointer(this, 16)
     var origin: List<Double> get() = doubles(24, 3); set(v) = doubles(24, v)
     var up: List<Double> get() = doubles(48, 3); set(v) = doubles(48, v)
 }
 
 internal class maq_predictor_config(outer: Memory? = null, at: Int = 0) : Struct(72, outer, at) {
-    val model = maq_model_options(this, 8)
-    var method: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
     var frame_pool_size: Int get() = int(44); set(v) = int(44, v)
     var temperature: Float get() = float(48); set(v) = float(48, v)
-    var top_k: Int get() = int(52); set(v) = int(52, v)
-    var seed: Long get() = long(56); set(v) = long(56, v)
+    var top_k: Int get() = int(52); set(v) = int(52, v); var seed: Long get() = long(56); set(v) = long(56, v)
     var shared_with: Long get() = long(64); set(v) = long(64, v)
 }
 
 internal class maq_predictor_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
-    val luma_ms get() = float(4).toDouble()
-    val flow_ms get() = float(8).toDouble()
-    val weights_ms get() = float(12).toDouble()
-    val push_ms get() = float(16).toDouble()
-    val project_ms get() = float(20).toDouble()
-    val warp_ms get() = float(24).toDouble()
-    val predict_ms get() = float(28).toDouble()
-    val networks_ms get() = float(32).toDouble()
-    val method get() = int(36)
-    val motion_fraction get() = float(40)
-    val pushed_count get() = long(48)
-    val predicted_count get() = long(56)
-    val reset_count get() = long(64)
-    val sampled_frame_count get() = int(72)
-    val step_count get() = int(76)
-    val cell_count get() = int(80)
+    val luma_ms get() = float(4).toDouble(); val flow_ms get() = float(8).toDouble()
+    val weights_ms get() = float(12).toDouble(); val push_ms get() = float(16).toDouble()
+    val project_ms get() = float(20).toDouble(); val warp_ms get() = float(24).toDouble()
+    val predict_ms get() = float(28).toDouble(); val networks_ms get() = float(32).toDouble()
+    val method get() = int(36); val motion_fraction get() = float(40); val pushed_count get() = long(48)
+    val predicted_count get() = long(56); val reset_count get() = long(64); val sampled_frame_count get() = int(72)
+    val step_count get() = int(76); val cell_count get() = int(80)
 }
 
 internal class maq_recorder_config(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {
-    var jpeg_quality: Int get() = int(4); set(v) = int(4, v)
-    var keep_predicted: Int get() = int(8); set(v) = int(8, v)
+    var jpeg_quality: Int get() = int(4); set(v) = int(4, v); var keep_predicted: Int get() = int(8); set(v) = int(8, v)
 }
 
 internal class maq_recorder_info(outer: Memory? = null, at: Int = 0) : Struct(24, outer, at) {
-    val frame_count get() = long(8)
-    val size_bytes get() = long(16)
+    val frame_count get() = long(8); val size_bytes get() = long(16)
 }
 
 internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Struct(112, outer, at) {
-    val model = maq_model_options(this, 8)
-    var long_side_px: Int get() = int(40); set(v) = int(40, v)
+    val model = maq_model_options(this, 8); var long_side_px: Int get() = int(40); set(v) = int(40, v)
     var coefficient_bits: Int get() = int(44); set(v) = int(44, v)
     var min_variation: Double get() = double(48); set(v) = double(48, v)
     var visibility_scale: Double get() = double(56); set(v) = double(56, v)
@@ -767,46 +580,28 @@ internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Stru
 }
 
 internal class maq_scene_build_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
-    val view_count get() = int(4)
-    val unused_view_count get() = int(8)
-    val cloud_point_count get() = long(16)
-    val seen_point_count get() = long(24)
-    val load_ms get() = double(32)
-    val visibility_ms get() = double(40)
-    val align_ms get() = double(48)
-    val extract_ms get() = double(56)
-    val accumulate_ms get() = double(64)
-    val solve_ms get() = double(72)
-    val pack_ms get() = double(80)
+    val view_count get() = int(4); val unused_view_count get() = int(8); val cloud_point_count get() = long(16)
+    val seen_point_count get() = long(24); val load_ms get() = double(32); val visibility_ms get() = double(40)
+    val align_ms get() = double(48); val extract_ms get() = double(56); val accumulate_ms get() = double(64)
+    val solve_ms get() = double(72); val pack_ms get() = double(80)
 }
 
 internal class maq_scene_info(outer: Memory? = null, at: Int = 0) : Struct(136, outer, at) {
-    val coefficient_bits get() = int(4)
-    val point_count get() = long(8)
-    val view_dependent_count get() = long(16)
-    val block_count get() = long(24)
-    val up get() = doubles(32, 3)
-    val bounds_min get() = doubles(56, 3)
-    val bounds_max get() = doubles(80, 3)
-    val networks_sha256 get() = bytes(104, 32)
+    val coefficient_bits get() = int(4); val point_count get() = long(8); val view_dependent_count get() = long(16)
+    val block_count get() = long(24); val up get() = doubles(32, 3); val bounds_min get() = doubles(56, 3)
+    val bounds_max get() = doubles(80, 3); val networks_sha256 get() = bytes(104, 32)
 }
 
 internal class maq_scene_render_stats(outer: Memory? = null, at: Int = 0) : Struct(64, outer, at) {
-    val project_ms get() = float(4).toDouble()
-    val shade_ms get() = float(8).toDouble()
-    val refine_ms get() = float(12).toDouble()
-    val resample_ms get() = float(16).toDouble()
-    val total_ms get() = float(20).toDouble()
-    val drawn_block_count get() = int(24)
-    val drawn_point_count get() = long(32)
-    val shaded_point_count get() = long(40)
-    val refined_pixel_count get() = long(48)
-    val provider get() = int(56)
+    val project_ms get() = float(4).toDouble(); val shade_ms get() = float(8).toDouble()
+    val refine_ms get() = float(12).toDouble(); val resample_ms get() = float(16).toDouble()
+    val total_ms get() = float(20).toDouble(); val drawn_block_count get() = int(24)
+    val drawn_point_count get() = long(32); val shaded_point_count get() = long(40)
+    val refined_pixel_count get() = long(48); val provider get() = int(56)
 }
 
 internal class maq_scene_renderer_config(outer: Memory? = null, at: Int = 0) : Struct(64, outer, at) {
-    val model = maq_model_options(this, 8)
-    var near_depth: Double get() = double(40); set(v) = double(40, v)
+    val model = maq_model_options(this, 8); var near_depth: Double get() = double(40); set(v) = double(40, v)
     var use_background: Int get() = int(48); set(v) = int(48, v)
     var background: ByteArray get() = bytes(52, 3); set(v) = bytes(52, v)
     var image_pool_size: Int get() = int(56); set(v) = int(56, v)
@@ -814,52 +609,37 @@ internal class maq_scene_renderer_config(outer: Memory? = null, at: Int = 0) : S
 
 internal class maq_source_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
     var frame_pool_size: Int get() = int(4); set(v) = int(4, v)
-    var queue_length: Int get() = int(8); set(v) = int(8, v)
-    var stall_ms: Int get() = int(12); set(v) = int(12, v)
+    var queue_length: Int get() = int(8); set(v) = int(8, v); var stall_ms: Int get() = int(12); set(v) = int(12, v)
     var reconnect_ms: Int get() = int(16); set(v) = int(16, v)
     var state_callback: Long get() = long(24); set(v) = long(24, v)
     var state_user_data: Long get() = long(32); set(v) = long(32, v)
-    var real_time: Int get() = int(40); set(v) = int(40, v)
-    var loop: Int get() = int(44); set(v) = int(44, v)
+    var real_time: Int get() = int(40); set(v) = int(40, v); var loop: Int get() = int(44); set(v) = int(44, v)
     var max_side_px: Int get() = int(48); set(v) = int(48, v)
 }
 
 internal class maq_source_control_info(outer: Memory? = null, at: Int = 0) : Struct(48, outer, at) {
-    val min get() = double(8)
-    val max get() = double(16)
-    val step get() = double(24)
-    val default_value get() = double(32)
-    val value get() = double(40)
+    val min get() = double(8); val max get() = double(16); val step get() = double(24)
+    val default_value get() = double(32); val value get() = double(40)
 }
 
 internal class maq_source_info(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val width_px get() = int(4)
-    val height_px get() = int(8)
-    val fps get() = double(16)
-    val frame_count get() = long(24)
-    val is_live get() = int(32)
-    val clock get() = int(36)
-    val frame_pool_size get() = int(40)
-    val dropped_frame_count get() = long(48)
+    val width_px get() = int(4); val height_px get() = int(8); val fps get() = double(16)
+    val frame_count get() = long(24); val is_live get() = int(32); val clock get() = int(36)
+    val frame_pool_size get() = int(40); val dropped_frame_count get() = long(48)
 }
 
 internal class maq_source_scheme(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
-    val name get() = Pointer(this, 8)
-    val example get() = Pointer(this, 16)
-    val summary get() = Pointer(this, 24)
+    val name get() = Pointer(this, 8); val example get() = Pointer(this, 16); val summary get() = Pointer(this, 24)
     val is_camera get() = int(32)
 }
 
 internal class maq_yuv_image(outer: Memory? = null, at: Int = 0) : Struct(120, outer, at) {
-    var width_px: Int get() = int(4); set(v) = int(4, v)
-    var height_px: Int get() = int(8); set(v) = int(8, v)
-    val planes get() = pointers(16, 3)
-    var size_bytes: List<Long> get() = longs(40, 3); set(v) = longs(40, v)
+    var width_px: Int get() = int(4); set(v) = int(4, v); var height_px: Int get() = int(8); set(v) = int(8, v)
+    val planes get() = pointers(16, 3); var size_bytes: List<Long> get() = longs(40, 3); set(v) = longs(40, v)
     var stride_bytes: List<Int> get() = ints(64, 3); set(v) = ints(64, v)
     var pixel_stride_bytes: List<Int> get() = ints(76, 3); set(v) = ints(76, v)
     var is_video_range: Int get() = int(88); set(v) = int(88, v)
     var rotation_deg: Int get() = int(92); set(v) = int(92, v)
     var timestamp_ns: Long get() = long(96); set(v) = long(96, v)
-    var clock: Int get() = int(104); set(v) = int(104, v)
-    var sequence: Long get() = long(112); set(v) = long(112, v)
+    var clock: Int get() = int(104); set(v) = int(104, v); var sequence: Long get() = long(112); set(v) = long(112, v)
 }

@@ -23,6 +23,5 @@ class ArCaptureActivity : CaptureActivity() {
             false
         }
 
-    override fun openCamera(): PosedCamera =
-        ArCoreCamera(this, maquette, windowManager.defaultDisplay.rotation * 90)
+    override fun openCamera(): PosedCamera = ArCoreCamera(this, maquette, windowManager.defaultDisplay.rotation * 90)
 }

@@ -84,11 +84,7 @@ class ArCoreCamera(
         return Intrinsics(width, height, fx.toDouble(), fy.toDouble(), cx - 0.5, cy - 0.5)
     }
 
-    private fun depthsOf(
-        frame: Frame,
-        intrinsics: Intrinsics,
-        pose: FloatArray,
-    ): FloatArray? =
+    private fun depthsOf(frame: Frame, intrinsics: Intrinsics, pose: FloatArray): FloatArray? =
         try {
             frame.acquireRawDepthImage16Bits().use { depth ->
                 frame.acquireRawDepthConfidenceImage().use { confidence ->
@@ -107,10 +103,7 @@ class ArCoreCamera(
         frame.acquirePointCloud().use { cloud -> FloatArray(cloud.points.remaining()).also { cloud.points.get(it) } }
 
     /** Without padding. */
-    private fun rowsOf(
-        image: Image,
-        pixelBytes: Int,
-    ): ByteArray {
+    private fun rowsOf(image: Image, pixelBytes: Int): ByteArray {
         val plane = image.planes[0]
         val rows = ByteArray(image.width * image.height * pixelBytes)
         for (y in 0 until image.height) {

@@ -24,10 +24,7 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
     val runs get() = times[0].size
 
     /** Takes the next frame, from the start again after the last, and finds its people. */
-    fun run(
-        densePose: DensePose,
-        isCounted: Boolean,
-    ) {
+    fun run(densePose: DensePose, isCounted: Boolean) {
         val cpu = Process.getElapsedCpuTime()
         val start = System.nanoTime()
         val frame = next()
@@ -50,10 +47,7 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
     }
 
     /** Of a stage ("frame": of all of it), interpolated. */
-    fun percentile(
-        stage: String,
-        percent: Int,
-    ): Double {
+    fun percentile(stage: String, percent: Int): Double {
         val sorted = times[STAGES.indexOf(stage)].sorted()
         val at = percent / 100.0 * (sorted.size - 1)
         val low = at.toInt()
@@ -118,11 +112,7 @@ class Benchmark(private val maquette: Maquette, private val bundle: ModelBundle)
      * @param runs frames of each source; ten more before them are not counted.
      * @param progress of the fraction that is done.
      */
-    fun run(
-        sources: List<String> = SOURCES,
-        runs: Int = 100,
-        progress: (Double) -> Unit = {},
-    ): JSONObject {
+    fun run(sources: List<String> = SOURCES, runs: Int = 100, progress: (Double) -> Unit = {}): JSONObject {
         val start = System.nanoTime()
         val densePose = maquette.densePose(bundle)
         val createMs = (System.nanoTime() - start) / 1e6
@@ -144,12 +134,7 @@ class Benchmark(private val maquette: Maquette, private val bundle: ModelBundle)
         }
     }
 
-    private fun report(
-        cases: List<TimedSource>,
-        runs: Int,
-        createMs: Double,
-        firstMs: Double,
-    ) = JSONObject()
+    private fun report(cases: List<TimedSource>, runs: Int, createMs: Double, firstMs: Double) = JSONObject()
         .put("schema", "maquette-bench-3")
         .put("machine", machine())
         .put("build", JSONObject().put("sdk", Maquette.version).put("onnxruntime", maquette.onnxRuntimeVersion))

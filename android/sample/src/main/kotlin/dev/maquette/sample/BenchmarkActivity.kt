@@ -22,11 +22,7 @@ open class BenchmarkActivity : Screen() {
     }
 
     @Deprecated("the platform's way without androidx")
-    override fun onActivityResult(
-        request: Int,
-        result: Int,
-        data: Intent?,
-    ) {
+    override fun onActivityResult(request: Int, result: Int, data: Intent?) {
         val file = data?.data ?: return
         val text = report?.toString(1) ?: return
         val write = { contentResolver.openOutputStream(file)!!.use { it.write(text.toByteArray()) } }

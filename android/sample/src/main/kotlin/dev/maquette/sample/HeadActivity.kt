@@ -56,10 +56,7 @@ open class HeadActivity : PictureScreen() {
         }
     }
 
-    override fun onPicked(
-        request: Int,
-        image: Uri,
-    ) {
+    override fun onPicked(request: Int, image: Uri) {
         if (request == SAVE) return save(image)
         say("Looking for the head …")
         inBackground({ build(decode(image), isFirst = request == FIRST) }) { sentence ->
@@ -76,10 +73,7 @@ open class HeadActivity : PictureScreen() {
     }
 
     /** On the worker; returns what is to be said. The head that is shown stays when it fails. */
-    private fun build(
-        photo: Bitmap,
-        isFirst: Boolean,
-    ): String {
+    private fun build(photo: Bitmap, isFirst: Boolean): String {
         val builder = builder.value
         if (isFirst) builder.clear()
         maquette.frame(photo).use { frame ->
@@ -121,10 +115,7 @@ open class HeadActivity : PictureScreen() {
         view = null
     }
 
-    private fun turn(
-        yaw: Double,
-        pitch: Double = 0.0,
-    ) {
+    private fun turn(yaw: Double, pitch: Double = 0.0) {
         place = Place(place.yaw + yaw, (place.pitch + pitch).coerceIn(-MAX_PITCH, MAX_PITCH))
         draw()
     }
@@ -174,10 +165,7 @@ open class HeadActivity : PictureScreen() {
             }
         }) { say("Saved. The file has the face's pixels: keep it as you would keep a photo.") }
 
-    protected open fun write(
-        to: Uri,
-        file: File,
-    ) {
+    protected open fun write(to: Uri, file: File) {
         contentResolver.openOutputStream(to)!!.use { stream -> file.inputStream().use { it.copyTo(stream) } }
     }
 

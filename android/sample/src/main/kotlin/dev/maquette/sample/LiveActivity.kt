@@ -40,10 +40,7 @@ open class LiveActivity : PeopleScreen() {
     }
 
     /** The source's URI. Pictures are upright on a display that is rotated by [displayDegrees]. */
-    protected open fun camera(
-        facing: String,
-        displayDegrees: Int,
-    ) = "android:$facing?display=$displayDegrees"
+    protected open fun camera(facing: String, displayDegrees: Int) = "android:$facing?display=$displayDegrees"
 
     private fun mayUseCamera() = checkSelfPermission(CAMERA) == PERMISSION_GRANTED
 
@@ -65,10 +62,7 @@ open class LiveActivity : PeopleScreen() {
         pipeline?.setSource(camera(facing, windowManager.defaultDisplay.rotation * 90))
     }
 
-    private fun showResult(
-        running: Pipeline,
-        result: PipelineResult,
-    ) = result.use {
+    private fun showResult(running: Pipeline, result: PipelineResult) = result.use {
         val people = people(it.densePose.people.size)
         val bitmap = it.frame.toBitmap()
         val how = paint(bitmap, it.densePose, running::surface)

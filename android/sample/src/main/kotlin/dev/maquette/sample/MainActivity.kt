@@ -22,10 +22,7 @@ class MainActivity : Screen(columns = 1) {
         open("Benchmark: how fast this device is", BenchmarkActivity::class.java)
     }
 
-    private fun open(
-        text: String,
-        screen: Class<out Screen>,
-    ) {
+    private fun open(text: String, screen: Class<out Screen>) {
         button(text) { startActivity(Intent(this, screen)) }
     }
 }

@@ -47,20 +47,13 @@ data class Orbit(
     val elevation: Double = 0.3,
 ) {
     /** Around by [across] and [up] radians, to [nearer] times the distance. */
-    fun moved(
-        across: Double = 0.0,
-        up: Double = 0.0,
-        nearer: Double = 1.0,
-    ) = copy(
+    fun moved(across: Double = 0.0, up: Double = 0.0, nearer: Double = 1.0) = copy(
         angle = angle + across,
         elevation = (elevation + up).coerceIn(-MAX_ELEVATION, MAX_ELEVATION),
         radius = radius * nearer,
     )
 
-    fun camera(
-        widthPx: Int,
-        heightPx: Int,
-    ): PinholeCamera {
+    fun camera(widthPx: Int, heightPx: Int): PinholeCamera {
         // Two directions of the horizon, whichever axis is up.
         val first = (up cross if (up.x * up.x < 0.5) Vector(1.0, 0.0, 0.0) else Vector(0.0, 1.0, 0.0)).unit()
         val horizontal = first * cos(angle) + (up cross first) * sin(angle)

@@ -29,10 +29,7 @@ class Outfit(picture: Bitmap, surface: BodySurface?) {
     }
 
     /** Dresses the people of a picture, in place. [people] are its own; U and V are needed. */
-    fun dress(
-        picture: Bitmap,
-        people: DensePoseResult,
-    ) {
+    fun dress(picture: Bitmap, people: DensePoseResult) {
         val parts = people.copyPlane(DensePoseResult.Plane.PART)
         val u = people.copyPlane(DensePoseResult.Plane.U)
         val v = people.copyPlane(DensePoseResult.Plane.V)
@@ -110,10 +107,7 @@ class Outfit(picture: Bitmap, surface: BodySurface?) {
     }
 
     /** Bilinear; (0.5, 0.5) is the first texel's centre, and the picture repeats itself. */
-    private fun texel(
-        x: Float,
-        y: Float,
-    ): Int {
+    private fun texel(x: Float, y: Float): Int {
         val (x0, y0) = floor(x - 0.5f) to floor(y - 0.5f)
         val (right, bottom) = ((x - 0.5f - x0) * 256).toInt() to ((y - 0.5f - y0) * 256).toInt()
         var (red, green, blue) = Triple(0, 0, 0)

@@ -43,11 +43,7 @@ abstract class PeopleScreen : PictureScreen() {
      * @param surface of the networks that found them.
      * @return how, for those who do not see it.
      */
-    protected fun paint(
-        picture: Bitmap,
-        people: DensePoseResult,
-        surface: () -> BodySurface?,
-    ): String {
+    protected fun paint(picture: Bitmap, people: DensePoseResult, surface: () -> BodySurface?): String {
         val wears = worn
         if (wears == null) {
             Canvas(picture).drawBitmap(people.overlay(), 0f, 0f, null)
@@ -58,10 +54,7 @@ abstract class PeopleScreen : PictureScreen() {
         return "dressed by a picture"
     }
 
-    override fun onPicked(
-        request: Int,
-        image: Uri,
-    ) {
+    override fun onPicked(request: Int, image: Uri) {
         if (request == OUTFIT) inBackground({ decode(image) }, ::wear)
     }
 

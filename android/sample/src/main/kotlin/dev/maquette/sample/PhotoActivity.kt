@@ -20,10 +20,7 @@ open class PhotoActivity : PeopleScreen() {
         addModeButtons()
     }
 
-    override fun onPicked(
-        request: Int,
-        image: Uri,
-    ) {
+    override fun onPicked(request: Int, image: Uri) {
         if (request != PHOTO) return super.onPicked(request, image)
         say("Opening …")
         inBackground({ decode(image) }) { bitmap ->

@@ -15,17 +15,10 @@ abstract class PictureScreen : Screen() {
         startActivityForResult(pick, request)
     }
 
-    protected abstract fun onPicked(
-        request: Int,
-        image: Uri,
-    )
+    protected abstract fun onPicked(request: Int, image: Uri)
 
     @Deprecated("the platform's way without androidx")
-    override fun onActivityResult(
-        request: Int,
-        result: Int,
-        data: Intent?,
-    ) {
+    override fun onActivityResult(request: Int, result: Int, data: Intent?) {
         data?.data?.let { onPicked(request, it) }
     }
 

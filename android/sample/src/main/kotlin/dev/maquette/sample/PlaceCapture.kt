@@ -97,10 +97,7 @@ class PlaceCapture(private val maxPhotos: Int = 60) : AutoCloseable {
         cells.clear()
     }
 
-    private fun isNear(
-        a: PinholeCamera,
-        b: PinholeCamera,
-    ): Boolean {
+    private fun isNear(a: PinholeCamera, b: PinholeCamera): Boolean {
         val away = (Vector.of(a.centre) - Vector.of(b.centre)).length
         val turn = Vector.of(a.rotation.takeLast(3)) dot Vector.of(b.rotation.takeLast(3))
         return away < MIN_MOVE_M && acos(turn.coerceIn(-1.0, 1.0)) < MIN_TURN_RAD
@@ -149,10 +146,7 @@ class PlaceCapture(private val maxPhotos: Int = 60) : AutoCloseable {
     }
 
     /** null for what is out of reach or no number. */
-    private fun cellOf(
-        points: FloatArray,
-        first: Int,
-    ): Long? {
+    private fun cellOf(points: FloatArray, first: Int): Long? {
         var cell = 0L
         for (axis in 0..2) {
             val at = floor(points[first + axis] / CELL_M)

@@ -44,11 +44,7 @@ open class SceneActivity : Screen() {
     }
 
     @Deprecated("the platform's way without androidx")
-    override fun onActivityResult(
-        request: Int,
-        result: Int,
-        data: Intent?,
-    ) {
+    override fun onActivityResult(request: Int, result: Int, data: Intent?) {
         data?.data?.let(::load)
     }
 

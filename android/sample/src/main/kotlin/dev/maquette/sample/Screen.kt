@@ -81,10 +81,7 @@ abstract class Screen(private val columns: Int = 2) : Activity() {
     /** This screen shows none. */
     protected fun removePicture() = rows.removeView(picture)
 
-    protected fun button(
-        text: String,
-        onClick: () -> Unit,
-    ): Button =
+    protected fun button(text: String, onClick: () -> Unit): Button =
         Button(this).also { button ->
             button.text = text
             button.setOnClickListener { onClick() }
@@ -94,10 +91,7 @@ abstract class Screen(private val columns: Int = 2) : Activity() {
         }
 
     /** [work] on the worker, then [done] with what it gave on the main thread. What it throws is said. */
-    protected fun <T> inBackground(
-        work: () -> T,
-        done: (T) -> Unit,
-    ) = worker.execute {
+    protected fun <T> inBackground(work: () -> T, done: (T) -> Unit) = worker.execute {
         val result = runCatching(work)
         runOnUiThread {
             if (!isDestroyed) result.onSuccess(done).onFailure { say(it.message ?: it.toString()) }

@@ -14,11 +14,7 @@ import org.junit.Assert.assertTrue
 import org.junit.Test
 
 class OutfitTest : AndroidTest() {
-    private fun bitmap(
-        width: Int,
-        height: Int,
-        colour: (x: Int, y: Int) -> Int,
-    ): Bitmap {
+    private fun bitmap(width: Int, height: Int, colour: (x: Int, y: Int) -> Int): Bitmap {
         val pixels = IntArray(width * height) { colour(it % width, it / width) }
         return Bitmap.createBitmap(pixels, width, height, Bitmap.Config.ARGB_8888).copy(Bitmap.Config.ARGB_8888, true)
     }

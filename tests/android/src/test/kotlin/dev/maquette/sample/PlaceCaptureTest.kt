@@ -33,10 +33,7 @@ class PlaceCaptureTest : AndroidTest() {
     }
 
     /** At x, turned about y. */
-    private fun pose(
-        x: Double,
-        turn: Double = 0.0,
-    ): FloatArray {
+    private fun pose(x: Double, turn: Double = 0.0): FloatArray {
         val (c, s) = cos(turn) to sin(turn)
         val columns = listOf(c, 0.0, -s, 0.0, 0.0, 1.0, 0.0, 0.0, s, 0.0, c, 0.0, x, 1.5, 0.0, 1.0)
         return columns.map(Double::toFloat).toFloatArray()

@@ -49,10 +49,7 @@ class PosedRoom(
     }
 
     /** Of a held-out photo and of what `scene` shows from there, in levels. */
-    fun differenceFromHeldOut(
-        scene: Scene,
-        networks: ModelBundle,
-    ): Double {
+    fun differenceFromHeldOut(scene: Scene, networks: ModelBundle): Double {
         val index = capture.views.indices.first { capture.views[it].isHeldOut }
         val view = capture.views[index].camera
         val intrinsics =

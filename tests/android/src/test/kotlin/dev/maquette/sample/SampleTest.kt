@@ -34,8 +34,7 @@ private fun fromFolder(name: String) = ModelBundle.ofFolder(TestFiles.bundle.res
 
 private val outfit = TestFiles.bundle.resolve("../../../desktop_demo/assets/outfit.png")
 
-private fun readBitmap(file: File): Bitmap =
-    BitmapFactory.decodeFile(file.path).copy(Bitmap.Config.ARGB_8888, true)
+private fun readBitmap(file: File): Bitmap = BitmapFactory.decodeFile(file.path).copy(Bitmap.Config.ARGB_8888, true)
 
 class LiveOfStub : LiveActivity() {
     override fun networks(name: String) = fromFolder(name)
@@ -61,10 +60,7 @@ class HeadOfFile : HeadActivity() {
 
     override fun decode(image: Uri) = readBitmap(File(image.path!!))
 
-    override fun write(
-        to: Uri,
-        file: File,
-    ) {
+    override fun write(to: Uri, file: File) {
         file.copyTo(File(to.path!!))
     }
 }
@@ -115,11 +111,7 @@ class SampleTest : AndroidTest() {
         text: String,
     ) = views(activity).filterIsInstance<Button>().single { it.text.startsWith(text) }
 
-    private fun until(
-        activity: Activity,
-        what: String,
-        condition: () -> Boolean,
-    ) {
+    private fun until(activity: Activity, what: String, condition: () -> Boolean) {
         try {
             until(what, meanwhile = { shadowOf(Looper.getMainLooper()).idle() }, condition)
         } catch (error: AssertionError) {
@@ -127,10 +119,7 @@ class SampleTest : AndroidTest() {
         }
     }
 
-    private fun <T : Activity> screen(
-        type: Class<T>,
-        test: (T) -> Unit,
-    ) {
+    private fun <T : Activity> screen(type: Class<T>, test: (T) -> Unit) {
         val controller: ActivityController<T> = Robolectric.buildActivity(type).setup()
         try {
             test(controller.get())
@@ -140,10 +129,7 @@ class SampleTest : AndroidTest() {
     }
 
     /** The answer of a picker. */
-    private fun answer(
-        activity: Activity,
-        file: File,
-    ) {
+    private fun answer(activity: Activity, file: File) {
         val asked = shadowOf(activity).nextStartedActivityForResult
         val data = Intent().setData(Uri.fromFile(file))
         shadowOf(activity).receiveResult(asked.intent, Activity.RESULT_OK, data)
@@ -221,10 +207,7 @@ class SampleTest : AndroidTest() {
                 answer(head, TestFiles.photo)
                 until(head, "the head while it forms") { picture(head).contentDescription.contains("not finished") }
                 until(head, "a head") { sentence(head).startsWith("A head from 1 photo.") }
-                fun shownAfter(
-                    text: String,
-                    degrees: Int,
-                ): Bitmap {
+                fun shownAfter(text: String, degrees: Int): Bitmap {
                     val before = (picture(head).drawable as BitmapDrawable).bitmap
                     button(head, text).performClick()
                     until(head, text) { !(picture(head).drawable as BitmapDrawable).bitmap.sameAs(before) }

@@ -30,10 +30,7 @@ class ScreensTest : AndroidTest() {
             BenchmarkActivity::class.java,
         )
 
-    private fun onEach(
-        qualifiers: String = "",
-        test: (Activity, List<View>) -> Unit,
-    ) {
+    private fun onEach(qualifiers: String = "", test: (Activity, List<View>) -> Unit) {
         fun below(view: View): List<View> =
             listOf(view) + if (view is ViewGroup) List(view.childCount, view::getChildAt).flatMap(::below) else listOf()
         for (type in screens) {

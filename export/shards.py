@@ -1,4 +1,4 @@
-"""The training shard (docs/reference/formats.md): many labelled pictures in one .npz file.
+"""The training shard (docs/reference/formats.md): many labelled images in one .npz file.
 
 Written by `export.people.dataset` (rendered people) and `export.teachers.shards` (photographs), read by training,
 calibration and evaluation. A label is uint8 [H, W, 4] = (I, U * 255, V * 255, instance); labels of photographs may know
@@ -85,7 +85,7 @@ def visible_boxes(label: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 class ShardWriter:
-    """Collects pictures and writes them as one shard. boxes: whether it also stores the visible boxes."""
+    """Collects images and writes them as one shard. boxes: whether it also stores the visible boxes."""
 
     def __init__(self, boxes: bool) -> None:
         self._files: dict[str, list[bytes]] = {"image": [], "label": [], "point": []}
@@ -194,8 +194,8 @@ class LabelledImage:
     name: shard and position, the same in every run. image: uint8 [H, W, 3] RGB. label: uint8 [H, W, 4]
     holding I, U*255, V*255, instance. point: float32 [H, W, 3], surface point on the template body in
     metres, or None. box: float32 [n, 4] x0, y0, x1, y1. instance: uint8 [n], the box's number in label.
-    ignore: bool [n]. axis: float32 [n, 2], the direction in the picture (x to the right, y down) from the middle of the
-    hips to the top of the head; its length is 1 where the body lies in the picture's plane and 0 where it is seen along
+    ignore: bool [n]. axis: float32 [n, 2], the direction in the image (x to the right, y down) from the middle of the
+    hips to the top of the head; its length is 1 where the body lies in the image's plane and 0 where it is seen along
     the axis. NaN where nobody knows, None where nobody knows any.
     """
 

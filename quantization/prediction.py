@@ -26,7 +26,7 @@ from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
 from export.prediction.refiner.image_error import psnr_db
-from export.prediction.refiner.refiner_graph import MENDED
+from export.prediction.refiner.refiner_graph import REFINED
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
@@ -80,7 +80,7 @@ def cost(fp32: Path, int8: Path, frames: np.ndarray, codes: FrameCodes) -> dict[
 Quality = dict[str, dict[str, float]]  # signal to noise in dB, by graph and output
 
 
-def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings) -> tuple[Quality, dict[str, float]]:
+def quantized_images(options: argparse.Namespace, settings: PredictionSettings) -> tuple[Quality, dict[str, float]]:
     """Writes the graphs that see or make images into the int8 bundle; returns their quality and what int8 costs."""
     codes = read_code_file(options.fp32 / CODES)
     calibrating = frames_of(options.data, options.sets, "train", settings.frames)
@@ -91,15 +91,15 @@ def quantized_pictures(options: argparse.Namespace, settings: PredictionSettings
     return quality, cost(options.fp32, options.out, held_out, codes)
 
 
-def kept_pictures(options: argparse.Namespace) -> tuple[Quality, dict[str, float]]:
+def kept_images(options: argparse.Namespace) -> tuple[Quality, dict[str, float]]:
     """The same from the bundle to be kept. Raises SystemExit where that has other codes."""
     if (options.keep / CODES).read_bytes() != (options.fp32 / CODES).read_bytes():
         raise SystemExit(f"{options.keep} has other codes than {options.fp32}: leave --keep out.")
     for name in GRAPHS if options.keep.resolve() != options.out.resolve() else ():
         shutil.copyfile(options.keep / f"{name}.onnx", options.out / f"{name}.onnx")
     measured = read_manifest(options.keep)["measured"]
-    of_pictures = {name: own for name, own in measured["int8_cost"].items() if name.startswith(("equal", "psnr"))}
-    return {name: own for name, own in measured["sqnr_db"].items() if name in GRAPHS}, of_pictures
+    of_images = {name: own for name, own in measured["int8_cost"].items() if name.startswith(("equal", "psnr"))}
+    return {name: own for name, own in measured["sqnr_db"].items() if name in GRAPHS}, of_images
 
 
 def main() -> None:
@@ -117,10 +117,10 @@ def main() -> None:
     options = parser.parse_args()
     settings = read_settings(options.settings, PredictionSettings)
     options.out.mkdir(parents=True, exist_ok=True)
-    quality, measured = kept_pictures(options) if options.keep else quantized_pictures(options, settings)
+    quality, measured = kept_images(options) if options.keep else quantized_images(options, settings)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    for name in (TRANSFORMER, f"{MENDED}.onnx"):  # of an earlier bundle
+    for name in (TRANSFORMER, f"{REFINED}.onnx"):  # of an earlier bundle
         (options.out / name).unlink(missing_ok=True)
     if (options.fp32 / TRANSFORMER).exists():
         calibrating = read_codes(options.codes, "train")

@@ -23,22 +23,22 @@ from export.bundle import BundleInfo, bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.prediction.bundle import write_manifest
 from export.prediction.motion_images import HORIZONS
-from export.prediction.refiner.auto_predictions import read_foreseen
+from export.prediction.refiner.auto_predictions import read_predictions
 from export.prediction.refiner.convolutional import times_ahead
 from export.prediction.refiner.image_error import psnr_db
-from export.prediction.refiner.refiner_graph import MENDED, export_mended
+from export.prediction.refiner.refiner_graph import REFINED, export_refined
 from export.prediction.refiner.train_convolutional import load_convolutional
 from quantization.quantize import as_measured, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
 
 
-def mended_samples(
+def refined_samples(
     folder: Path, sets: Sequence[str], split: str, count: int, before: int
 ) -> tuple[list[Sample], np.ndarray]:
     """Inputs of the graph, evenly over clips and times ahead, and what came then, uint8 [count, 64, 64, 3]. folder:
     what `export.prediction.refiner.auto_predictions` wrote. Raises SystemExit where there is nothing."""
-    known = read_foreseen([folder], list(sets), split)
+    known = read_predictions([folder], list(sets), split)
     clips = known.clips
     total = clips.frames.shape[1]
     samples: list[Sample] = []
@@ -54,11 +54,11 @@ def mended_samples(
     return samples, np.stack(truth)
 
 
-def mended_cost(graphs: dict[str, Path], samples: Sequence[Sample], truth: np.ndarray) -> dict[str, float]:
-    """PSNR of what each graph makes, as mended_db_NAME, and of what it mends, foreseen_db."""
+def refined_cost(graphs: dict[str, Path], samples: Sequence[Sample], truth: np.ndarray) -> dict[str, float]:
+    """PSNR of what each graph gives, as mended_db_NAME, and of its input, foreseen_db."""
     wanted = torch.from_numpy(truth)
-    foreseen = torch.from_numpy(np.concatenate([sample["pictures"][..., -3:] for sample in samples]))
-    found = {"foreseen_db": round(float(psnr_db(foreseen, wanted).mean()), 2)}
+    predictions = torch.from_numpy(np.concatenate([sample["pictures"][..., -3:] for sample in samples]))
+    found = {"foreseen_db": round(float(psnr_db(predictions, wanted).mean()), 2)}
     for name, path in graphs.items():
         graph = session(path)
         made = torch.from_numpy(np.concatenate([graph.run(None, sample)[0] for sample in samples]))
@@ -66,20 +66,22 @@ def mended_cost(graphs: dict[str, Path], samples: Sequence[Sample], truth: np.nd
     return found
 
 
-def put_mended(weights: Path, bundle: Path, foreseen: Path, sets: Sequence[str], settings: PredictionSettings) -> dict:
-    """Returns the new manifest. Raises ValueError for weights of a network that is not shown what is foreseen."""
+def put_refined(
+    weights: Path, bundle: Path, predictions: Path, sets: Sequence[str], settings: PredictionSettings
+) -> dict:
+    """Returns the new manifest. Raises ValueError for weights of a network that is not shown the prediction."""
     net = load_convolutional(weights)
     counts = {"train": settings.frames, "val": settings.held_out_frames}
-    given = {split: mended_samples(foreseen, sets, split, n, net.shape.frames) for split, n in counts.items()}
-    graph = f"{MENDED}.onnx"
+    given = {split: refined_samples(predictions, sets, split, n, net.shape.frames) for split, n in counts.items()}
+    graph = f"{REFINED}.onnx"
     with tempfile.TemporaryDirectory() as folder:
         fp32, int8 = Path(folder) / "fp32", Path(folder) / "int8"
         fp32.mkdir()
         int8.mkdir()
-        export_mended(net, fp32)
-        calibrating, held_out = ({MENDED: samples} for samples, _ in given.values())
-        quality = quantize_graphs(fp32, int8, {MENDED: settings.graphs[MENDED]}, calibrating, held_out)
-        cost = mended_cost({"fp32": fp32 / graph, "int8": int8 / graph}, *given["val"])
+        export_refined(net, fp32)
+        calibrating, held_out = ({REFINED: samples} for samples, _ in given.values())
+        quality = quantize_graphs(fp32, int8, {REFINED: settings.graphs[REFINED]}, calibrating, held_out)
+        cost = refined_cost({"fp32": fp32 / graph, "int8": int8 / graph}, *given["val"])
         shutil.copyfile(int8 / graph, bundle / graph)
     print(", ".join(f"{name} {value}" for name, value in cost.items()))
     known = read_manifest(bundle)
@@ -94,12 +96,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--weights", type=Path, default=Path(".data/runs/prediction-refiner/weights.pt"))
     parser.add_argument("--bundle", type=Path, default=Path(".data/bundles/prediction-int8"))
-    parser.add_argument("--foreseen", type=Path, default=Path(".data/prediction/foreseen"))
+    parser.add_argument("--predictions", type=Path, default=Path(".data/prediction/auto"))
     parser.add_argument("--sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
     parser.add_argument("--settings", type=Path, default=PREDICTION)
     options = parser.parse_args()
     settings = read_settings(options.settings, PredictionSettings)
-    put_mended(options.weights, options.bundle, options.foreseen, options.sets, settings)
+    put_refined(options.weights, options.bundle, options.predictions, options.sets, settings)
     print(f"{options.bundle}: {bytes_of(options.bundle) / 1e6:.2f} MB")
 
 

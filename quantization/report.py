@@ -29,7 +29,7 @@ from quantization import agreement, check
 from quantization.analysis.comparison import TensorError, activation_errors, weight_errors, worst_first
 from quantization.analysis.errors import float_nodes_left
 from quantization.analysis.saturation import Saturation, saturation
-from quantization.report_files import write_markdown, write_picture
+from quantization.report_files import write_image, write_markdown
 from quantization.samples import Sample, collect, spread
 
 SCHEMA = "maquette-quantization-1"
@@ -211,7 +211,7 @@ def _write(arguments: argparse.Namespace, paths: tuple[Path, Path, Path], consol
     paths[2].parent.mkdir(parents=True, exist_ok=True)
     paths[0].write_text(compact(found))
     write_markdown(paths[1], found)
-    write_picture(paths[2], tensors)
+    write_image(paths[2], tensors)
     console.print("Written: " + ", ".join(str(path) for path in paths))
     return 0
 

@@ -110,7 +110,7 @@ def _db(value: float | None) -> str:
     return "" if value is None else f"{value:.1f}"
 
 
-def write_picture(path: Path, tensors: list[TensorError]) -> None:
+def write_image(path: Path, tensors: list[TensorError]) -> None:
     """Own and gathered error along each graph, the worst activations named."""
     graphs = list(dict.fromkeys(tensor.graph for tensor in tensors))
     heights = [2.2 if graph == "trunk" else 1 for graph in graphs]

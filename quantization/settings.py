@@ -99,7 +99,7 @@ class PredictionSettings:
     """graphs: settings by graph name, also of graphs that only some bundles have. frames, held_out_frames: how many
     frames calibrate, and measure the error."""
 
-    GRAPHS: ClassVar[tuple[str, ...]] = (*prediction.GRAPHS, prediction.MENDED)
+    GRAPHS: ClassVar[tuple[str, ...]] = (*prediction.GRAPHS, prediction.REFINED)
 
     graphs: dict[str, GraphSettings]
     frames: int

@@ -1,7 +1,7 @@
-"""Opens every view of the desktop demo, on rendered people, a clip, a room, solids, a photo: pictures of its guide.
+"""Opens every view of the desktop demo, on rendered people, a clip, a room, solids, a photo: images of its guide.
 
 scripts/install-packages.sh test && make build && scripts/make-venv.sh
-.venv/bin/python scripts/desktop-demo-pictures.py
+.venv/bin/python scripts/desktop-demo-images.py
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def with_a_jump(folder: Path) -> str:
 
 
 def sheet(pictures: list[np.ndarray], columns: int, width_px: int) -> np.ndarray:
-    """Pictures of one size beside and below each other."""
+    """Images of one size beside and below each other."""
     height_px = round(pictures[0].shape[0] * width_px / pictures[0].shape[1])
     small = [cv2.resize(p, (width_px, height_px), interpolation=cv2.INTER_AREA) for p in pictures]
     rows = [np.hstack(small[i : i + columns]) for i in range(0, len(small), columns)]
@@ -89,7 +89,7 @@ def main() -> None:
             return picture
 
         keep("desktop-demo.jpg", run((CLIP[0], 40), "--view", "contours"))
-        # The picture alone, without the panel.
+        # The image alone, without the panel.
         alone = ("--no-mesh",)
         keep("desktop-people.jpg", sheet([run(PEOPLE, "--view", v, *alone)[44:756, :950] for v in VIEWS], 3, 520))
         keep("desktop-clip.jpg", sheet([run(CLIP, "--view", v, *alone)[133:667, :950] for v in VIEWS], 3, 520))

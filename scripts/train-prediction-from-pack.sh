@@ -48,17 +48,17 @@ for split in train val; do
   "$python" -m export.prediction.refiner.auto_predictions --sets $sets --split $split --processes "${PROCESSES:-5}"
 done
 minutes=$(spare 0.95)
-"$python" -m export.prediction.refiner.train_convolutional --sets $sets --foreseen .data/prediction/foreseen \
+"$python" -m export.prediction.refiner.train_convolutional --sets $sets --predictions .data/prediction/auto \
   --out .data/runs/prediction-refiner --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
-  >mender.log 2>&1 &
-mender=$!
+  >refiner.log 2>&1 &
+refiner=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3
 wait "$convolutional" || echo "the convolutional network failed" >&2
-wait "$mender" || echo "the mender failed" >&2
-tail -n 3 convolutional.log mender.log
-for name in transformer convolutional mender; do keep "prediction-$name" "$name"; done
-cp convolutional.log mender.log "$out/"
+wait "$refiner" || echo "the refiner failed" >&2
+tail -n 3 convolutional.log refiner.log
+for name in transformer convolutional refiner; do keep "prediction-$name" "$name"; done
+cp convolutional.log refiner.log "$out/"
 "$python" - "$out" <<'HALF'
 import sys
 from pathlib import Path

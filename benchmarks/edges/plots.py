@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.edges.baselines import BASELINES
 from benchmarks.edges.methods import SHIPPED
 from benchmarks.sweep import pareto
-from export.edges.validation import field_picture, slope_picture
+from export.edges.validation import field_image, slope_image
 
 COLOURS = {"shipped": "black", "savings": "tab:green", "networks": "tab:blue", "without a network": "0.55"}
 SHEET = "edges-sheet.jpg"
@@ -104,11 +104,11 @@ def write_sheet(shown: list[dict], folder: Path) -> Path:
     for line, row in zip(axes, shown, strict=True):
         frame, known = row["view"].frame, (row["depth"] > 0)[..., None]
         counts = frame.counts & known[..., 0]
-        labelled = np.where(frame.counts[..., None], field_picture(frame.distance), 60).astype(np.uint8)
-        cells = {ways[0]: (slope_picture(row["depth"], frame.focal_px), row["level"]), ways[1]: (labelled, "")}
+        labelled = np.where(frame.counts[..., None], field_image(frame.distance), 60).astype(np.uint8)
+        cells = {ways[0]: (slope_image(row["depth"], frame.focal_px), row["level"]), ways[1]: (labelled, "")}
         for name, distance in row["fields"].items():
             rmse = np.sqrt(np.mean((np.clip(distance, 0, None) - frame.distance)[counts] ** 2))
-            cells[name] = np.where(known, field_picture(distance), 0).astype(np.uint8), f"{rmse:.2f} r"
+            cells[name] = np.where(known, field_image(distance), 0).astype(np.uint8), f"{rmse:.2f} r"
         for axis, name in zip(line, ways, strict=True):
             picture, under = cells.get(name, (np.full((2, 2, 3), 255, np.uint8), "not measured"))
             axis.imshow(picture)

@@ -18,11 +18,11 @@ import numpy as np
 import trimesh
 from tqdm import tqdm
 
-from export.heads.head_shards import FACE_RADIUS_DM, HeadPictures
+from export.heads.head_shards import FACE_RADIUS_DM, HeadImages
 from export.heads.sampling import look_at, sample_camera, sample_lamps
 from export.heads.shapes import vertex_normals
 from export.heads.surface import Place
-from export.heads.view_shards import picture_row
+from export.heads.view_shards import image_row
 from export.heads.views import Scene
 from export.people.assets import Package, fetch
 
@@ -143,8 +143,8 @@ def main() -> None:
             camera = sample_camera(surface, rng)
             away = -camera.rotation[2]  # dm from the head to the camera
             if abs(np.arctan2(away[0], -away[1])) < np.radians(50):
-                rows.append(picture_row(head.scene.seen(camera, sample_lamps(rng))))
-        pictures = HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
+                rows.append(image_row(head.scene.seen(camera, sample_lamps(rng))))
+        pictures = HeadImages(*(np.stack(column) for column in zip(*rows, strict=True)))
         face = np.linalg.norm(surface - head.nose_tip, axis=1) < FACE_RADIUS_DM
         columns = {f.name: getattr(pictures, f.name) for f in fields(pictures)}
         np.savez(arguments.out / f"{name}.npz", surface=surface.astype(np.float32), face=face, **columns)

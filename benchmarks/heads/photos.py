@@ -18,7 +18,7 @@ from benchmarks.heads.distances import MM_PER_DM, Triangles, TruePoints
 from benchmarks.heads.face_mesh import is_inner_face
 from benchmarks.heads.visible import seen_from, seen_from_outside
 from export.camera import Camera
-from export.heads.head_shards import HeadPictures, is_face, read_pictures
+from export.heads.head_shards import HeadImages, is_face, read_pictures
 from export.heads.sampling import sample_extras
 from export.heads.surface import Head, HeadMaker, cut_distance
 from export.heads.synthetic_heads import make_head
@@ -49,7 +49,7 @@ class TrueHead:
     """Images of a head, and points of its surface."""
 
     name: str
-    pictures: HeadPictures
+    pictures: HeadImages
     true: TruePoints
     traits: Mapping[str, str] = field(default_factory=dict)  # known traits: hair, skin, glasses
 
@@ -105,25 +105,25 @@ def yaw_pitch_deg(rotation: np.ndarray) -> tuple[float, float]:
     return float(np.degrees(np.arctan2(away[0], -away[1]))), float(np.degrees(np.arcsin(np.clip(away[2], -1, 1))))
 
 
-def _is_from(pictures: HeadPictures, k: int, low: float, high: float) -> bool:
+def _is_from(pictures: HeadImages, k: int, low: float, high: float) -> bool:
     yaw, pitch = yaw_pitch_deg(pictures.rotation[k])
     return low <= yaw <= high and abs(pitch) < MAX_PITCH_DEG
 
 
-def _is_whole(pictures: HeadPictures, k: int) -> bool:
+def _is_whole(pictures: HeadImages, k: int) -> bool:
     """Returns whether the image shows the head without truncation at its border, except at the neck."""
     mask = pictures.masks[k] == HEAD
     return bool(mask.any() and not mask[0].any() and not mask[:, 0].any() and not mask[:, -1].any())
 
 
-def camera_of(pictures: HeadPictures, k: int) -> Camera:
+def camera_of(pictures: HeadImages, k: int) -> Camera:
     focal, cx, cy = pictures.intrinsics[k]
     rotation, shift = pictures.rotation[k], pictures.shift[k]
     side = pictures.rgb.shape[1]
     return Camera(side, side, focal, focal, cx, cy, rotation, -rotation.T @ shift)
 
 
-def photo_of(pictures: HeadPictures, k: int, backgrounds: PhotoBackgrounds, rng: np.random.Generator) -> Photo:
+def photo_of(pictures: HeadImages, k: int, backgrounds: PhotoBackgrounds, rng: np.random.Generator) -> Photo:
     """Returns image k as a camera takes it. The bust continues beyond the border of the stored image."""
     camera, mask = camera_of(pictures, k), pictures.masks[k] == HEAD
     y, x = np.nonzero(mask)

@@ -50,7 +50,7 @@ class Agreement:
     equal: int = 0
     person_pixels: int = 0  # pixels labelled in either
     person_equal: int = 0
-    worst_picture: float = 1.0  # the smallest fraction of equal pixels
+    worst_image: float = 1.0  # the smallest fraction of equal pixels
     box_px: float = 0.0  # largest difference of a coordinate of a matched box, image pixels
 
     @property
@@ -104,7 +104,7 @@ def compare(reference: Path, other: Path) -> Agreement:
         agreement.equal += int(same.sum())
         agreement.person_pixels += int(person.sum())
         agreement.person_equal += int((same & person).sum())
-        agreement.worst_picture = min(agreement.worst_picture, float(same.mean()))
+        agreement.worst_image = min(agreement.worst_image, float(same.mean()))
         stem = name.removesuffix("_IUV.png")
         compare_boxes(read_boxes(reference / f"{stem}.json"), read_boxes(other / f"{stem}.json"), agreement)
     if agreement.people == 0:
@@ -157,7 +157,7 @@ def print_table(bundle: Path, results: dict[str, Agreement | str], bar: float) -
         if isinstance(found, str):
             table.add_row(name, *["-"] * 6, "failed")
             continue
-        found_fractions = (found.fraction, found.worst_picture, found.person_fraction)
+        found_fractions = (found.fraction, found.worst_image, found.person_fraction)
         fractions = [f"{100 * x:.3f}" for x in found_fractions]
         verdict = "held" if found.passes(bar) else "missed"
         table.add_row(name, str(found.people), str(found.unmatched), *fractions, f"{found.box_px:.2f}", verdict)

@@ -45,7 +45,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Rendered:
-    """ms: median over views by stage, with `total`. pictures: RGB float32 [H, W, 3] in 0..1 by the photo's name.
+    """ms: median over views by stage, with `total`. images: RGB float32 [H, W, 3] in 0..1 by the photo's name.
     wall_s: of the whole process."""
 
     ms: dict[str, float]

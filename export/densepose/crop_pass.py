@@ -71,7 +71,7 @@ class CropGraphs:
 
 @torch.no_grad()
 def crop_maps(graphs: CropGraphs, network: NetworkConfig, image: np.ndarray, crops: list[PersonCrop]) -> list[Tensor]:
-    """The dense head's coarse [P, 15, s, s], index, u and v [P, 25, s, s] of the crops of one picture uint8 [H, W, 3]
+    """The dense head's coarse [P, 15, s, s], index, u and v [P, 25, s, s] of the crops of one image uint8 [H, W, 3]
     BGR."""
     pixels = torch.from_numpy(np.stack([normalised(cut(image, crop, tuple(MEAN[::-1].tolist()))) for crop in crops]))
     boxes = [torch.from_numpy(crop.box[None].astype(np.float32)) for crop in crops]
@@ -79,7 +79,7 @@ def crop_maps(graphs: CropGraphs, network: NetworkConfig, image: np.ndarray, cro
 
 
 def painted(maps: list[Tensor], crop: PersonCrop, shape: tuple[int, int], config: DecodeConfig) -> np.ndarray:
-    """One person's labels in the picture, uint8 [H, W, 3] = (I, U*255, V*255), decoded as by
+    """One person's labels in the image, uint8 [H, W, 3] = (I, U*255, V*255), decoded as by
     `export.densepose.decode.paint`; 0 outside the person's box in the crop.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. From a pixel to them everything is affine: one bilinear reading.

@@ -34,11 +34,11 @@ def normalised(image: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Cropping:
-    """How crops of whole pictures are drawn: how often towards a person, whose long side then is `person_scale` crop
+    """How crops of whole images are drawn: how often towards a person, whose long side then is `person_scale` crop
     sides (log-uniform).
 
-    filled: min fraction of the crop's side that the picture's long side fills, so that the crop shows more than margin.
-    rolls: (fraction, smallest and largest angle in degrees, either way) by which pictures are turned that nobody tilted
+    filled: min fraction of the crop's side that the image's long side fills, so that the crop shows more than margin.
+    rolls: (fraction, smallest and largest angle in degrees, either way) by which images are turned that nobody tilted
     when they were made: photographs.
     """
 
@@ -143,7 +143,7 @@ USUAL_CROPPING = Cropping(
     towards_person=0.85, person_scale=(0.16, 1.3), filled=0.9, rolls=((0.76, 0, 12), (0.19, 12, 45), (0.05, 45, 180))
 )
 PERSON_CROPPING = PersonCropping()
-SCALES = (0.06, 2.0)  # of the stored picture
+SCALES = (0.06, 2.0)  # of the stored image
 MIN_AXIS = 0.15  # length below which the body axis points at the camera (`export.shards.LabelledImage.axis`)
 _FILL = tuple(float(v) for v in MEAN[::-1])
 

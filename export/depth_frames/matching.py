@@ -17,7 +17,7 @@ class MatchingError(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Rectified:
-    """Grey pictures uint8 [H, W] whose rows belong together, left and right; focal_px; cx_px, cy_px of the left one;
+    """Grey images uint8 [H, W] whose rows belong together, left and right; focal_px; cx_px, cy_px of the left one;
     baseline: distance of the cameras in the unit of depth; right_cx_px."""
 
     left: np.ndarray

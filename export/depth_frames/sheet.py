@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from export.edges.data import Frame, frame_of
-from export.edges.validation import field_picture
+from export.edges.validation import field_image
 from export.solids.records import Record
 from export.solids.sheet import painted_depth, shaded
 
@@ -25,7 +25,7 @@ def row_of(record: Record, field: Callable[[np.ndarray, float], np.ndarray]) -> 
     """uint8 [h, 4 TILE_PX, 3], RGB: depth, normals of the depth, field (bright at edges), where no edge is right."""
     planes, frame = record.decoded(), frame_of(record)
     known = frame.depth > 0
-    made = np.where(known[..., None], field_picture(field(frame.depth, frame.focal_px)), 0).astype(np.uint8)
+    made = np.where(known[..., None], field_image(field(frame.depth, frame.focal_px)), 0).astype(np.uint8)
     smooth = np.where(frame.counts[..., None], made, made // 4)
     tiles = [painted_depth(planes["depth"]), shaded(planes["depth"], record.intrinsics), made, smooth]
     size = TILE_PX, round(TILE_PX * record.height / record.width)

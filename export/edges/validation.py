@@ -59,12 +59,12 @@ def validate(
     return out
 
 
-def field_picture(distance: np.ndarray) -> np.ndarray:
+def field_image(distance: np.ndarray) -> np.ndarray:
     """[H, W] in r -> RGB, bright at edges."""
     return (matplotlib.colormaps["magma"](1 - np.clip(distance / EPS_R, 0, 1))[..., :3] * 255).astype(np.uint8)
 
 
-def slope_picture(depth: np.ndarray, focal_px: float) -> np.ndarray:
+def slope_image(depth: np.ndarray, focal_px: float) -> np.ndarray:
     """The network's input as colours; unknown pixels are black: uint8 [H, W, 3], RGB."""
     planes = slopes(torch.from_numpy(depth)[None], torch.full((1, 2), focal_px))[0].numpy()
     picture = np.stack([planes[0], planes[1], np.zeros_like(planes[0])], -1) * 127 + 128
@@ -75,10 +75,10 @@ def sheet(network: EdgeNetwork, bins: int, frames: Sequence[Frame], levels: Sequ
     """RGB, uint8: a row a frame: the true field, then by level what the sensor sees and the network's field."""
     field, rows = field_of(network, bins), []
     for frame in frames:
-        tiles = [np.where(frame.counts[..., None], field_picture(frame.distance), 60).astype(np.uint8)]
+        tiles = [np.where(frame.counts[..., None], field_image(frame.distance), 60).astype(np.uint8)]
         for level in levels:
             seen = frame_through(level, frame)
-            made = np.where((seen > 0)[..., None], field_picture(field(seen, frame.focal_px)), 0).astype(np.uint8)
-            tiles += [slope_picture(seen, frame.focal_px), made]
+            made = np.where((seen > 0)[..., None], field_image(field(seen, frame.focal_px)), 0).astype(np.uint8)
+            tiles += [slope_image(seen, frame.focal_px), made]
         rows.append(np.hstack([cv2.resize(t, (320, 240), interpolation=cv2.INTER_AREA) for t in tiles]))
     return np.vstack(rows)

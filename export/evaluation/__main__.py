@@ -14,7 +14,7 @@ from maquette import MaquetteError
 from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
 from export.evaluation.measure import Figures, image_ranges, measure
-from export.evaluation.plot import write_picture
+from export.evaluation.plot import write_image
 from export.jobs import Workers
 from export.shards import count_images, shard_paths
 
@@ -116,7 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
             "empty": [str(folder) for folder in arguments.empty],
             "animals": [str(folder) for folder in arguments.animals]}  # fmt: skip
     report.write_json(arguments.out / "evaluation.json", results, photo_results, sources, data)
-    write_picture(arguments.out / "evaluation.png", results, photo_results)
+    write_image(arguments.out / "evaluation.png", results, photo_results)
     print(f"Written: {arguments.out / 'evaluation.json'}, {arguments.out / 'evaluation.png'}")
     return 0
 

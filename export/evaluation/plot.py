@@ -27,7 +27,7 @@ SHARES_OF_PHOTOS = (
 )
 
 
-def write_picture(path: Path, results: dict[str, Figures], photo_results: dict[str, PhotoFigures]) -> None:
+def write_image(path: Path, results: dict[str, Figures], photo_results: dict[str, PhotoFigures]) -> None:
     """AP, calibration, groups and photographs above; the body parts below. One colour a column of the table; groups
     are those of the last column. photo_results may be empty."""
     figure = pyplot.figure(figsize=(18, 14), layout="constrained")

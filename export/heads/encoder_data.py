@@ -14,7 +14,7 @@ from export.heads.head_shards import (
     FACE_SIDES,
     LABEL_STEP,
     POINT_SCALE,
-    HeadPictures,
+    HeadImages,
     head_paths,
     is_face,
     read_pictures,
@@ -62,7 +62,7 @@ class Backgrounds:
 
 @dataclass(frozen=True)
 class Placing:
-    """A crop's place in a picture: linear [2, 2] and the whole map [2, 3] from pixels of the crop to pixels of the
+    """A crop's place in an image: linear [2, 2] and the whole map [2, 3] from pixels of the crop to pixels of the
     image, and whether it is mirrored."""
 
     linear: np.ndarray
@@ -75,7 +75,7 @@ class Placing:
         return float(np.linalg.norm(self.linear[:, 0]))
 
     def cut(self, picture: np.ndarray, border: int = cv2.BORDER_CONSTANT, value: tuple = ()) -> np.ndarray:
-        """float32 [192, 192, C] of a picture [H, W, C]: bilinear, of pixels averaged before where it shrinks. border,
+        """float32 [192, 192, C] of an image [H, W, C]: bilinear, of pixels averaged before where it shrinks. border,
         value: what is beyond the image, as of cv2.warpAffine."""
         to_picture = self.to_picture
         if self.zoom > MAX_BILINEAR_ZOOM:
@@ -125,7 +125,7 @@ def face_box(template: np.ndarray, known: np.ndarray) -> np.ndarray | None:
     return np.concatenate([at[strays], at[-1 - strays] + 1]).astype(float)
 
 
-def face_box_of(pictures: HeadPictures, k: int) -> np.ndarray | None:
+def face_box_of(pictures: HeadImages, k: int) -> np.ndarray | None:
     """`face_box` of image k, in its pixels."""
     step = 2
     template = pictures.template[k][::step, ::step] / np.float32(POINT_SCALE)
@@ -135,7 +135,7 @@ def face_box_of(pictures: HeadPictures, k: int) -> np.ndarray | None:
 
 
 def crop_of(
-    pictures: HeadPictures,
+    pictures: HeadImages,
     k: int,
     backgrounds: Backgrounds,
     rng: np.random.Generator,
@@ -198,7 +198,7 @@ def as_cameras_see(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return camera_faults(rng, np.clip(image, 0, 255)[..., ::-1])[..., ::-1]
 
 
-def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadPictures]:
+def read_heads(folder: Path, split: str, limit: int | None = None) -> list[HeadImages]:
     paths = head_paths(folder, split)[:limit]
     if not paths:
         raise FileNotFoundError(f"{folder / split} holds no pictures: run `python -m export.heads.view_shards {split}`")

@@ -44,7 +44,7 @@ class HeadPoints:
 
 
 @dataclass(frozen=True)
-class HeadPictures:
+class HeadImages:
     """K images of a head. rgb uint8 [K, 512, 512, 3]; masks uint8 [K, 512, 512]: 255 head, 128 bust, 0 nothing;
     template int16 [K, 256, 256, 3], dm times 8,000; normal int8 [K, 256, 256, 3], camera's axes, times 127;
     rotation [K, 3, 3] and shift [K, 3] from the head's frame (dm) to the camera's; intrinsics [K, 3]: focal, cx,
@@ -81,6 +81,6 @@ def read_points(folder: Path, split: str) -> list[HeadPoints]:
     return out
 
 
-def read_pictures(path: Path) -> HeadPictures:
+def read_pictures(path: Path) -> HeadImages:
     with np.load(path) as stored:
-        return HeadPictures(**{f.name: stored[f.name] for f in fields(HeadPictures)})
+        return HeadImages(**{f.name: stored[f.name] for f in fields(HeadImages)})

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.heads.head_shards import SPLITS, HeadPictures, HeadPoints, head_path
+from export.heads.head_shards import SPLITS, HeadImages, HeadPoints, head_path
 from export.heads.shapes import HeadShapes
 from export.heads.surface import Head, HeadMaker
 from export.people import assets
@@ -46,7 +46,7 @@ def shard_parser(description: str, out: Path) -> argparse.ArgumentParser:
 
 
 def write_shards(
-    arguments: argparse.Namespace, kind: str, make: Callable[[Head, np.random.Generator], HeadPoints | HeadPictures]
+    arguments: argparse.Namespace, kind: str, make: Callable[[Head, np.random.Generator], HeadPoints | HeadImages]
 ) -> None:
     """One file for each head that has none yet; each appears atomically. kind: what the random numbers depend on
     beside the head's own."""

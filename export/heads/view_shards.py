@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadImages
 from export.heads.sampling import sample_camera, sample_extras, sample_lamps
 from export.heads.surface import Head
 from export.heads.synthetic_heads import shard_parser, write_shards
 from export.heads.views import HeadViews, Seen
 
 
-def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPictures:
+def images_of(head: Head, count: int, rng: np.random.Generator) -> HeadImages:
     """Draws `count` images of a head, each in other light."""
     extras = sample_extras(rng)
     views = HeadViews(head, extras)
@@ -28,12 +28,12 @@ def pictures_of(head: Head, count: int, rng: np.random.Generator) -> HeadPicture
     points = points[points[:, 2] > -1.6]
     for _ in range(count):
         camera = sample_camera(points, rng)
-        rows.append(picture_row(views.seen(camera, sample_lamps(rng))))
-    return HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
+        rows.append(image_row(views.seen(camera, sample_lamps(rng))))
+    return HeadImages(*(np.stack(column) for column in zip(*rows, strict=True)))
 
 
-def picture_row(seen: Seen) -> tuple:
-    """The fields of `HeadPictures` of one image."""
+def image_row(seen: Seen) -> tuple:
+    """The fields of `HeadImages` of one image."""
     camera, step = seen.camera, slice(None, None, LABEL_STEP)
     masks = np.where(seen.mask, 255, np.where(seen.present, 128, 0)).astype(np.uint8)
     normal = (seen.normal[step, step] @ camera.rotation.T) * 127
@@ -48,7 +48,7 @@ def main() -> None:
     parser = shard_parser(__doc__, Path(".data/heads/views"))
     parser.add_argument("--views", type=int, default=16, help="images a head")
     arguments = parser.parse_args()
-    write_shards(arguments, "views", lambda head, rng: pictures_of(head, arguments.views, rng))
+    write_shards(arguments, "views", lambda head, rng: images_of(head, arguments.views, rng))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """How often rendered people are small, tilted, crowded or seen from behind: the settings of a rendering.
 
 `CLOSE` is what the shipped weights were trained and tested on: 320 x 256, mostly alone, upright and facing the camera.
-`WIDE` shows what a webcam in a room and a phone video show: 640 x 512, people from 1/14 of the picture's height up,
-tilted pictures, a third of the people from behind, crowds in which boxes overlap.
+`WIDE` shows what a webcam in a room and a phone video show: 640 x 512, people from 1/14 of the image's height up,
+tilted images, a third of the people from behind, crowds in which boxes overlap.
 `USUAL` shows people at the size of `WIDE` as photographs usually do: most upright and facing the camera, one in eight
 small, half of those scattered or before a webcam in poses of photographs.
 `ANIMALS` shows animals and nobody, for a detector of people to learn the difference
@@ -20,7 +20,7 @@ import numpy as np
 class Variety:
     """Settings of a rendering; every fraction is of the images or the people it applies to.
 
-    generator: name written into shards; the same name means the same pictures.
+    generator: name written into shards; the same name means the same images.
     sizes: (width, height) in pixels, by shard number.
     layouts: fraction of the images, and the fractions of 1, 2, 3, … people in them.
     framings: of scattered people: (fraction, centre of the view and least and largest visible height in body heights).
@@ -28,7 +28,7 @@ class Variety:
         hand's unsteadiness.
     turned_around: fraction of the people who are turned by half a turn after their yaw was drawn.
     bare_chest, hat, hood: fractions of the people.
-    animals_alone, animals_beside: fractions of the pictures without and with people that show animals.
+    animals_alone, animals_beside: fractions of the images without and with people that show animals.
     photo_poses: fraction of the people scattered or before a webcam that stand as people of photographs do
         (`photo_poses.json`), where there are such poses.
     """

@@ -1,11 +1,11 @@
 """Draws the outfit that the desktop demo's try-on view puts on people: a striped jersey, jeans, shoes and a hat.
 
-    python -m export.people.outfit [--out outfit.png] [--picture worn.png]
+    python -m export.people.outfit [--out outfit.png] [--image worn.png]
 
-The picture is a DensePose texture atlas: 4 columns of 6 square tiles, part p in column (p - 1) // 6 and row
+The image is a DensePose texture atlas: 4 columns of 6 square tiles, part p in column (p - 1) // 6 and row
 (p - 1) % 6; in a tile U grows to the right and V upwards (as DensePose's notebook of texture transfer reads them).
 The colour of a place is a function of its point on the template body, so what is drawn goes on across chart borders.
-`--picture` shows the template body wearing it. Ours alone: it may be used like the code.
+`--image` shows the template body wearing it. Ours alone: it may be used like the code.
 """
 
 from __future__ import annotations

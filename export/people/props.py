@@ -313,7 +313,7 @@ class PropMaker:
         if u() < 0.5:
             side = 1 if u() < 0.5 else -1
             props.append(self.finished(rng, box((0.05, 16, 6), (eye[0] + side * u(1.5, 4), far - 7.9, 2.9))))
-        if u() < 0.5:  # a window, a door or a picture
+        if u() < 0.5:  # a window, a door or an image
             size, high = u(0.4, 1.6, 2), u(0.9, 2)
             props.append(
                 self.finished(rng, box((size[0], 0.04, size[1]), (eye[0] + u(-2, 2), far - 0.05, high)), repeats=0.7)

@@ -42,7 +42,7 @@ class Sample:
 
 
 def body_axis(hips: np.ndarray, skull: np.ndarray, camera: Camera) -> np.ndarray:
-    """Direction of the body axis in the picture, float32 [2]; its length is the sine of the angle to the line of sight.
+    """Direction of the body axis in the image, float32 [2]; its length is the sine of the angle to the line of sight.
 
     hips, skull: world points [3]. NaN where the head is behind the camera.
     """
@@ -53,9 +53,9 @@ def body_axis(hips: np.ndarray, skull: np.ndarray, camera: Camera) -> np.ndarray
     if at[2] <= _NEAR_M:
         return np.full(2, np.nan, np.float32)
     across = along - at * (along @ at) / (at @ at)
-    in_picture = along[:2] - at[:2] / at[2] * along[2]
+    in_image = along[:2] - at[:2] / at[2] * along[2]
     length = np.linalg.norm(across) / np.linalg.norm(along)
-    return (in_picture * length / max(float(np.linalg.norm(in_picture)), 1e-9)).astype(np.float32)
+    return (in_image * length / max(float(np.linalg.norm(in_image)), 1e-9)).astype(np.float32)
 
 
 class Studio:
@@ -201,7 +201,7 @@ def _light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors:
 
 
 def _composed(rng: np.random.Generator, picture: Picture, behind: np.ndarray) -> np.ndarray:
-    """The picture over the photo `behind`: BGR float32 [H, W, 3]."""
+    """The image over the photo `behind`: BGR float32 [H, W, 3]."""
     alpha, colour = picture.alpha, picture.rgb[..., ::-1]
     if rng.random() < 0.5:
         # Haze, lens and film give a photo one range of tones, of which people in it have their part.

@@ -269,7 +269,7 @@ class Director:
         return placed, aim
 
     def _some_animals(self, rng: np.random.Generator, aim: Aim, alone: bool) -> list[Prop]:
-        """One to three animals on the ground: alone as large in the picture as a subject, else of their own size."""
+        """One to three animals on the ground: alone as large in the image as a subject, else of their own size."""
         visible = aim.distance * aim.width_per_depth * self.height / self.width
         placed = []
         for k in range(1 + int(rng.choice(3, p=[0.6, 0.25, 0.15]))):

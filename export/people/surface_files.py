@@ -1,4 +1,4 @@
-"""Writes what bundles and docs say about the atlas: the surface grid and a picture of the charts.
+"""Writes what bundles and docs say about the atlas: the surface grid and an image of the charts.
 
     python -m export.people.surface_files
 

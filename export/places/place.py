@@ -24,7 +24,7 @@ class PlaceError(ValueError):
 
 
 class Pictures(Sequence):
-    """Read when asked for: `p[3]` is one picture [H, W, ...], `p[2:5]` or `p[[7, 1]]` are several [n, H, W, ...]."""
+    """Read when asked for: `p[3]` is one image [H, W, ...], `p[2:5]` or `p[[7, 1]]` are several [n, H, W, ...]."""
 
     def __init__(self, files: list[Path], height: int, width: int, read) -> None:
         self.files, self.height, self.width, self._read = files, height, width, read

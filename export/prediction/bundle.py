@@ -12,7 +12,7 @@ from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
 from export.prediction.graphs.transformer_graphs import CONTEXT, SLICES, head_name
 from export.prediction.motion_images import HORIZONS
-from export.prediction.refiner.refiner_graph import MENDED
+from export.prediction.refiner.refiner_graph import REFINED
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
@@ -54,10 +54,10 @@ def write_manifest(folder: Path, info: BundleInfo) -> dict:
         require_transformer(graphs, tables, codes)
         keys["transformer"] = {"file": TRANSFORMER, "fps": list(TRAINED_FPS)}
         files.append(TRANSFORMER)
-    if (folder / f"{MENDED}.onnx").exists():
-        graphs[MENDED] = signature_of(folder / f"{MENDED}.onnx")
-        before = graphs[MENDED]["inputs"]["pictures"][3] // 3 - 1
-        keys[MENDED] = {"before": before, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
+    if (folder / f"{REFINED}.onnx").exists():
+        graphs[REFINED] = signature_of(folder / f"{REFINED}.onnx")
+        before = graphs[REFINED]["inputs"]["pictures"][3] // 3 - 1
+        keys[REFINED] = {"before": before, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
     return write_bundle_manifest(folder, "prediction", info, graphs, files=files, task_keys=keys)
 
 

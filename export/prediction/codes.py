@@ -61,9 +61,9 @@ def coded_clips(net: Autoencoder, clips: Clips, mirrored: bool, workers: Workers
     device = next(net.parameters()).device
     count, frames = clips.frames.shape[:2]
     ways = 2 if mirrored else 1
-    pictures_of_frame = 1 + len(HORIZONS)
+    images_of_frame = 1 + len(HORIZONS)
     size = (net.shape.slices, CODE_SIDE, CODE_SIDE)
-    found = torch.empty(count, ways, frames, pictures_of_frame, *size, dtype=torch.int16)
+    found = torch.empty(count, ways, frames, images_of_frame, *size, dtype=torch.int16)
     jobs = [MotionJob(k, clips.frames[k].numpy(), float(clips.fps[k])) for k in range(count)]
     with tqdm(total=count, unit="clip", desc="motion and codes", leave=False) as bar:
         for job, moved in results(workers.run(motion_pictures, jobs)):

@@ -30,7 +30,7 @@ from export.prediction.config import CODE_SIDE
 from export.prediction.export_transformer import export_transformer
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
 from export.prediction.refiner.convolutional import ConvolutionalNet
-from export.prediction.refiner.refiner_graph import MENDED, export_mended
+from export.prediction.refiner.refiner_graph import REFINED, export_refined
 from export.prediction.refiner.train_convolutional import load_convolutional
 from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
@@ -95,16 +95,16 @@ def export_bundle(
     folder: Path,
     info: BundleInfo,
     transformer: LatentTransformer | None = None,
-    mender: ConvolutionalNet | None = None,
+    refiner: ConvolutionalNet | None = None,
 ) -> dict[str, float]:
     """The whole bundle; returns how far each part is from torch. Raises ValueError where that is too far. table: the
     transformer's own, where there is one."""
     folder.mkdir(parents=True, exist_ok=True)
     differences = export_graphs(net, folder)
-    for name in (TRANSFORMER, f"{MENDED}.onnx"):  # of an earlier export
+    for name in (TRANSFORMER, f"{REFINED}.onnx"):  # of an earlier export
         (folder / name).unlink(missing_ok=True)
-    if mender is not None:
-        differences[MENDED] = export_mended(mender, folder)
+    if refiner is not None:
+        differences[REFINED] = export_refined(refiner, folder)
     if transformer is not None:
         differences["transformer"] = export_transformer(transformer, folder)
         write_whole(transformer_bytes(TransformerTables.of(transformer)), folder / TRANSFORMER)
@@ -121,7 +121,7 @@ def main() -> None:
         "--codes", type=Path, default=Path(".data/prediction"), help="folder of export.prediction.codes"
     )
     parser.add_argument("--transformer", type=Path, help="its weights, whose table is taken; default: without one")
-    parser.add_argument("--mender", type=Path, help="weights of the network that mends; default: without one")
+    parser.add_argument("--refiner", type=Path, help="weights of the refiner; default: without one")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     options = parser.parse_args()
@@ -134,8 +134,8 @@ def main() -> None:
     else:
         table = CodeTable.of_stacked(transformer.table)
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=TRAINING_DATA)
-    mender = load_convolutional(options.mender) if options.mender else None
-    for name, difference in export_bundle(net, table, options.out, info, transformer, mender).items():
+    refiner = load_convolutional(options.refiner) if options.refiner else None
+    for name, difference in export_bundle(net, table, options.out, info, transformer, refiner).items():
         print(f"{name}: within {difference:.1e} of torch")
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
 

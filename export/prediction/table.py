@@ -68,9 +68,9 @@ def bits_by_table(table: CodeTable, codes: Tensor) -> Tensor:
 
 
 def bits_of_stream(
-    frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray, foreseen_bits: np.ndarray | None = None
+    frequency_bits: np.ndarray, after_bits: np.ndarray, codes: np.ndarray, predicted_bits: np.ndarray | None = None
 ) -> np.ndarray:
-    """The SDK's bits of one stream: each code either stays or follows the table, or foreseen_bits [T - 1, slices, 16,
+    """The SDK's bits of one stream: each code either stays or follows the table, or predicted_bits [T - 1, slices, 16,
     16] where these are given. Each cell learns which of the two from the frames so far: the posterior of two experts
     (Herbster and Warmuth, "Tracking the best expert", 1998). A cut is a frame with at least as many bits as its codes
     have by frequency alone; after it, cells have learnt nothing.
@@ -83,7 +83,7 @@ def bits_of_stream(
     stays, found = at_first, []
     for number, (before, now) in enumerate(pairwise(codes)):
         own = np.where(now == before, stays, 0)
-        moves = after_bits[slices, before, now] if foreseen_bits is None else foreseen_bits[number]
+        moves = after_bits[slices, before, now] if predicted_bits is None else predicted_bits[number]
         likely = own + (1 - stays) * np.exp2(-moves.astype(np.float64))
         found.append(-np.log2(likely))
         is_cut = found[-1].sum() >= frequency_bits[slices, now].sum()

@@ -148,7 +148,7 @@ def bits_of(net: LatentTransformer, table: CodeTable, clips: CodedClips, count: 
 
 
 @torch.no_grad()
-def sample_picture(net: LatentTransformer, autoencoder: Autoencoder, clips: CodedClips, count: int = 3) -> Tensor:
+def sample_image(net: LatentTransformer, autoencoder: Autoencoder, clips: CodedClips, count: int = 3) -> Tensor:
     """Rows of five frames of 64 x 64: last seen (decoded), next by its true codes, likeliest, and two drawn at
     temperature 1; uint8 [count * 64, 5 * 64, 3]."""
     net.eval()
@@ -207,7 +207,7 @@ def train(arguments: argparse.Namespace) -> None:
         lambda: bits_of(training.net, table, held_out, arguments.validate_frames), "bits a code, held out",
     )  # fmt: skip
     if arguments.autoencoder:
-        picture = sample_picture(training.net, load_autoencoder(arguments.autoencoder).to(device), held_out)
+        picture = sample_image(training.net, load_autoencoder(arguments.autoencoder).to(device), held_out)
         cv2.imwrite(str(arguments.out / "sample.png"), picture.cpu().numpy()[..., ::-1])
 
 

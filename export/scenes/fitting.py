@@ -1,4 +1,4 @@
-"""From photos and a cloud to descriptors, and from descriptors to a picture: all of NPBG++ (arXiv 2203.13318) in torch.
+"""From photos and a cloud to descriptors, and from descriptors to an image: all of NPBG++ (arXiv 2203.13318) in torch.
 
 The reference for the SDK and what training differentiates through. Points are float64 [P, 3], photos RGB in 0..1
 [H, W, 3] (numpy float32), features and rasters float32.

@@ -28,7 +28,7 @@ class LossWeights:
     full: float = 1.0
 
 
-def picture_terms(
+def image_terms(
     picture: Tensor, target: Tensor, mask: Tensor, weights: LossWeights, perceptual: Perceptual | None
 ) -> dict[str, Tensor]:
     """Images RGB [N, 3, H, W], mask [N, 1, H, W] of the target's pixels that are there."""

@@ -31,7 +31,7 @@ from export.scenes.config import SIZES
 from export.scenes.fitting import Options, fitted_to_features, fitted_to_views, painted, render
 from export.scenes.geometry.source_views import scores
 from export.scenes.image_quality import psnr_db
-from export.scenes.losses import LossWeights, own_rasters, picture_terms
+from export.scenes.losses import LossWeights, image_terms, own_rasters
 from export.scenes.networks.extractor import STRIDE
 from export.scenes.networks.system import Networks, save_networks
 from export.scenes.perceptual import Perceptual, load_perceptual
@@ -80,7 +80,7 @@ def batch_terms(
     mask = torch.stack([sample.mask for sample in samples]).to(device)
     with half:
         picture = networks.refiner([torch.stack(level) for level in zip(*rasters, strict=True)])
-        terms = picture_terms(picture.float(), target, mask, weights, perceptual)
+        terms = image_terms(picture.float(), target, mask, weights, perceptual)
     if weights.own:
         # The refiner alone: what it makes of an image's own features should be the image.
         with torch.no_grad():

@@ -20,7 +20,7 @@ from export.scenes.config import BASIS, FEATURES, LEVELS, MULTIPLE, ROTATED_MULT
 from export.scenes.fitting import Options, View, coverage, shown_in
 from export.scenes.geometry.cameras import between, moves, upright
 from export.scenes.geometry.raster import Pyramid, filled, pyramid
-from export.scenes.losses import LossWeights, picture_terms
+from export.scenes.losses import LossWeights, image_terms
 from export.scenes.networks.basis import directions
 from export.scenes.networks.system import Networks
 from export.scenes.perceptual import Perceptual
@@ -152,7 +152,7 @@ class Tuning:
             self._queue = self._random.permutation(len(self._photos)).tolist()
         k = self._queue.pop()
         photo = self._photos[k]
-        terms = picture_terms(
+        terms = image_terms(
             self.scene.picture(self.shown[k]), photo, torch.ones_like(photo[:, :1]), self.weights, self.perceptual
         )
         loss = sum(terms.values())

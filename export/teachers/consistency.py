@@ -121,7 +121,7 @@ class Consensus:
 
 
 def _read(answer: Answer, box: np.ndarray, at: np.ndarray, possible: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The best part among `possible` bool [K, 25] at the points `at` [K, 2] of the picture: uint8 [K, 3] =
+    """The best part among `possible` bool [K, 25] at the points `at` [K, 2] of the image: uint8 [K, 3] =
     (I, U*255, V*255), and the part's probability float32 [K] among all."""
     if not len(at):
         return np.zeros((0, 3), np.uint8), np.zeros(0, np.float32)

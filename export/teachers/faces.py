@@ -48,7 +48,7 @@ class Square:
         return (shares - 0.5) @ self.linear().T + self.centre
 
     def cut(self, image: np.ndarray, side: int) -> np.ndarray:
-        """The square as picture [side, side, C]; grey outside of the photo. Shrunk by areas: not in one step."""
+        """The square as image [side, side, C]; grey outside of the photo. Shrunk by areas: not in one step."""
         linear = self.linear() / side
         reduce = max(1, int(self.size / side))  # whole steps by area first, so that nothing is skipped
         middle = self.centre + linear @ np.full(2, 0.5 - side / 2)

@@ -70,7 +70,7 @@ def model(body, atlas):
 
 @pytest.fixture(scope="session")
 def renderer(model, atlas):
-    """Draws pictures of 160 x 256 pixels."""
+    """Draws images of 160 x 256 pixels."""
     from export.people.lookup import LabelLookup
     from export.people.render import Renderer
 

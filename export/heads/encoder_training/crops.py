@@ -24,7 +24,7 @@ _GREY = 127.0
 
 @dataclass(frozen=True)
 class Placings:
-    """Maps from pixels of B crops to pixels of their pictures: linear [B, 2, 2], offset [B, 2], mirrored bool [B],
+    """Maps from pixels of B crops to pixels of their images: linear [B, 2, 2], offset [B, 2], mirrored bool [B],
     zoom [B]; on the CPU."""
 
     linear: Tensor
@@ -65,7 +65,7 @@ def placings(side: int, face: Tensor, of_face: Tensor, random: torch.Generator) 
 
 
 def cut(pictures: Tensor, place: Placings, border: str = "zeros", nearest: bool = False) -> Tensor:
-    """Crops [B, C, 192, 192] of pictures float [B, C, H, W]; where images shrink, of four places a pixel."""
+    """Crops [B, C, 192, 192] of images float [B, C, H, W]; where images shrink, of four places a pixel."""
     device = pictures.device
     height, width = pictures.shape[2:]
     index = torch.arange(CROP_PX, device=device, dtype=torch.float32)

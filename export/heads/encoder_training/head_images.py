@@ -24,7 +24,7 @@ _TEXTURE_MEAN = (185.0, 145.0, 123.0)
 
 @dataclass
 class Pool:
-    """N images, the fields of `HeadPictures` that crops are cut from. planes uint8 [N, 512, 512, 4]: RGB and masks;
+    """N images, the fields of `HeadImages` that crops are cut from. planes uint8 [N, 512, 512, 4]: RGB and masks;
     template int16 [N, 256, 256, 3]; normal int8 [N, 256, 256, 3]; face float32 [N, 4]: box of the face, px, NaN where
     too little is seen of it."""
 
@@ -50,7 +50,7 @@ class Pool:
 
 
 def slow_noise(points: Tensor, picture: Tensor, frequency: float, pictures: int, generator: torch.Generator) -> Tensor:
-    """`hair.slow_noise` of points [N, 3], another for each picture [N]."""
+    """`hair.slow_noise` of points [N, 3], another for each image [N]."""
     directions = torch.randn(pictures, 6, 3, generator=generator)
     lengths = frequency * 2 * torch.pi * (0.6 + 0.8 * torch.rand(pictures, 6, 1, generator=generator))
     directions = (directions / directions.norm(dim=-1, keepdim=True) * lengths).to(points.device)

@@ -28,7 +28,7 @@ def rasterized(corners: Tensor, nearness: Tensor, picture: Tensor, side: int, pe
     """Rasterizes triangles into B square images of `side` pixels.
 
     corners float32 [F, 3, 2]: pixels of each triangle's corners. nearness [F, 3] > 0: larger is nearer, affine over the
-    picture: 1 / depth in perspective, else any constant less the depth. picture int64 [F]. Triangles with a corner
+    image: 1 / depth in perspective, else any constant less the depth. image int64 [F]. Triangles with a corner
     whose nearness is not positive are left out.
     """
     low = corners.amin(1).ceil().clamp(min=0)

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
-from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadPictures, read_pictures
+from export.heads.head_shards import LABEL_STEP, POINT_SCALE, HeadImages, read_pictures
 
 FILE = Path(__file__).with_name("face_points.json")
 MAX_YAW, MAX_PITCH, MAX_ROLL = np.radians(30), np.radians(25), np.radians(25)
@@ -60,7 +60,7 @@ def write_face_points(points: FacePoints, made: dict, path: Path) -> None:
     path.write_text(head[:-2] + ',\n "points": [\n' + text + "\n]\n}\n")
 
 
-def frontal(pictures: HeadPictures) -> np.ndarray:
+def frontal(pictures: HeadImages) -> np.ndarray:
     """Numbers of the images that show the face upright and from the front, the most frontal first."""
     rotation, shift = pictures.rotation.astype(np.float64), pictures.shift.astype(np.float64)
     camera = -np.einsum("kij,ki->kj", rotation, shift)  # in the head's frame
@@ -72,7 +72,7 @@ def frontal(pictures: HeadPictures) -> np.ndarray:
     return numbers[np.argsort(abs(yaw[numbers]))]
 
 
-def on_template(pictures: HeadPictures, k: int, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def on_template(pictures: HeadImages, k: int, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Template points [N, 3] (dm) and normals [N, 3] (head's frame) at pixels [N, 2] of image k, NaN off the head.
 
     Between the stored pixels template points are mixed where the surface is one piece."""
@@ -101,7 +101,7 @@ def on_template(pictures: HeadPictures, k: int, pixels: np.ndarray) -> tuple[np.
         return found[:, :3], found[:, 3:] / np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
 
 
-def shown(pictures: HeadPictures, k: int) -> np.ndarray:
+def shown(pictures: HeadImages, k: int) -> np.ndarray:
     """Image k before grey, BGR."""
     empty = pictures.masks[k] == 0
     return np.where(empty[..., None], np.uint8(_GREY), pictures.rgb[k])[..., ::-1].copy()
@@ -148,7 +148,7 @@ def collect(folder: Path, count: int) -> tuple[np.ndarray, np.ndarray, int]:
     return template, normal, asked
 
 
-def drawn(points: FacePoints, pictures: HeadPictures, k: int, zoom: int = 3) -> np.ndarray:
+def drawn(points: FacePoints, pictures: HeadImages, k: int, zoom: int = 3) -> np.ndarray:
     """Image k with the points where its template labels say they are: used ones green, others red. BGR."""
     image = cv2.resize(shown(pictures, k), None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
     template = pictures.template[k].astype(np.float64) / POINT_SCALE

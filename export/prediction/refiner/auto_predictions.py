@@ -1,14 +1,14 @@
-"""Writes what the SDK foresees of clips by `auto`, as images of 64 x 64: what the network that mends it is given.
+"""Writes the SDK's predictions of clips by `auto`, as images of 64 x 64: the input of the refiner.
 
     python -m export.clips.dataset pushing --large --clips 700 --out .data/clips-large
     python -m export.prediction.refiner.auto_predictions --data .data/clips-large --sets pushing collages
     python -m export.prediction.refiner.auto_predictions --sets pushing --split val
 
-It is foreseen from frames of 320 x 240 where a clip has some, else from those of 64 x 64, whose edges are rougher, so
-that motion is less exact. A file a clip, OUT/SET/SPLIT/clip-NUMBER.npz: `frames` uint8 [T, 64, 64, 3], R, G, B;
-`foreseen` uint8 [T, horizons, 64, 64, 3], made after frame t was seen, as if HORIZONS[h] frames later, 0 where the clip
-does not go on for so long and after its first frame; `fps`. Some 2 MB a clip. What is there already is kept. Needs the
-SDK's library.
+Predictions are made from frames of 320 x 240 where a clip has some, else from frames of 64 x 64, whose edges are
+rougher, so that motion is less exact. A file a clip, OUT/SET/SPLIT/clip-NUMBER.npz: `frames` uint8 [T, 64, 64, 3], R,
+G, B; `predictions` uint8 [T, horizons, 64, 64, 3], made after frame t was seen, as if HORIZONS[h] frames later, 0 where
+the clip does not go on for so long and after its first frame; `fps`. Some 2 MB a clip. What is
+there already is kept. Needs the SDK's library.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from export.prediction.motion_images import HORIZONS, is_known
 
 
 @dataclass(frozen=True, eq=False)
-class ForeseenClips:
-    """clips, and what is foreseen of them: uint8 [N, T, horizons, 64, 64, 3]."""
+class PredictedClips:
+    """clips, and the prediction of them: uint8 [N, T, horizons, 64, 64, 3]."""
 
     clips: Clips
     pictures: Tensor
 
-    def on(self, device: torch.device) -> ForeseenClips:
-        return ForeseenClips(self.clips.on(device), self.pictures.to(device))
+    def on(self, device: torch.device) -> PredictedClips:
+        return PredictedClips(self.clips.on(device), self.pictures.to(device))
 
 
 def squeezed(picture: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ def squeezed(picture: np.ndarray) -> np.ndarray:
     return cv2.resize(picture, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA)
 
 
-def foreseen(frames: np.ndarray, fps: float, threads: int = 1) -> np.ndarray:
+def predictions_of(frames: np.ndarray, fps: float, threads: int = 1) -> np.ndarray:
     """Predictions of `auto` from frames uint8 [T, H, W, 3] of a clip: uint8 [T, horizons, 64, 64, 3], in the format of
     the files. Raises MaquetteError where the SDK's library is not built."""
     import maquette  # in the process that does it: its library starts threads
@@ -61,34 +61,39 @@ def foreseen(frames: np.ndarray, fps: float, threads: int = 1) -> np.ndarray:
     return found
 
 
-def write_foreseen(job: tuple[Path, Path]) -> None:
+def write_predictions(job: tuple[Path, Path]) -> None:
     """Writes the predictions of a clip's file atomically."""
     source, path = job
     clip = read_clip(source)
     rgb = (clip.large or clip.small).rgb
     partial = path.with_name(f".{path.name}.partial")
     with partial.open("wb") as file:
-        np.savez(file, frames=np.stack([squeezed(one) for one in rgb]), foreseen=foreseen(rgb, clip.fps), fps=clip.fps)
+        np.savez(
+            file,
+            frames=np.stack([squeezed(one) for one in rgb]),
+            predictions=predictions_of(rgb, clip.fps),
+            fps=clip.fps,
+        )
     partial.rename(path)
 
 
-def read_foreseen(folders: list[Path], kinds: list[str], split: str) -> ForeseenClips:
+def read_predictions(folders: list[Path], kinds: list[str], split: str) -> PredictedClips:
     """All files of these sets in all these folders. Raises SystemExit where there are none."""
     paths = [(kind, path) for folder in folders for kind in kinds for path in clip_paths(folder, kind, split)]
     if not paths:
         names, places = " ".join(kinds), " or ".join(map(str, folders))
         raise SystemExit(
-            f"Nothing is foreseen of {names} in {places} ({split}). Write it: python -m "
+            f"There are no predictions of {names} in {places} ({split}). Write it: python -m "
             f"export.prediction.refiner.auto_predictions --split {split} --sets {names} --out {folders[0]}"
         )
     frames, pictures, fps = [], [], []
     for _, path in paths:
         with np.load(path) as stored:
             frames.append(torch.from_numpy(stored["frames"]))
-            pictures.append(torch.from_numpy(stored["foreseen"]))
+            pictures.append(torch.from_numpy(stored["predictions"]))
             fps.append(float(stored["fps"]))
     names = [f"{kind}/{path.stem}" for kind, path in paths]
-    return ForeseenClips(Clips(torch.stack(frames), torch.tensor(fps), names), torch.stack(pictures))
+    return PredictedClips(Clips(torch.stack(frames), torch.tensor(fps), names), torch.stack(pictures))
 
 
 def main() -> None:
@@ -97,7 +102,7 @@ def main() -> None:
     parser.add_argument("--sets", nargs="+", default=["pushing", "collages"], help="default %(default)s")
     parser.add_argument("--split", choices=SPLITS, default="train")
     parser.add_argument("--clips", type=int, help="of each set, at most (default: all)")
-    parser.add_argument("--out", type=Path, default=Path(".data/prediction/foreseen"))
+    parser.add_argument("--out", type=Path, default=Path(".data/prediction/auto"))
     Workers.add_arguments(parser)
     options = parser.parse_args()
     jobs = []
@@ -109,7 +114,7 @@ def main() -> None:
         raise SystemExit(f"No clips of {', '.join(options.sets)} in {options.data} ({options.split}).")
     missing = [job for job in jobs if not job[1].exists()]
     with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit="clip") as bar:
-        for _ in results(Workers.of(options).run(write_foreseen, missing)):
+        for _ in results(Workers.of(options).run(write_predictions, missing)):
             bar.update()
 
 

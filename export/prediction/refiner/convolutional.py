@@ -1,6 +1,6 @@
 """A convolutional network that predicts a frame from the three before, in the manner of SimVP (arXiv 2206.05099): an
 encoder, blocks of wide convolutions at a quarter of the size, a decoder. It has no codes and no probabilities: what the
-transformer is compared with. Given an image that is foreseen as well, it mends that: it mixes it, cell by cell, with
+transformer is compared with. Given a predicted image as well, it refines that: it mixes it, cell by cell, with
 its own."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def times_ahead(fps: Tensor, frames: Tensor) -> Tensor:
 @dataclass(frozen=True)
 class ConvolutionalShape:
     """widths: channels at 64 x 64, 32 x 32 and 16 x 16 pixels; blocks: at the last; frames: seen; kernel: of blocks;
-    motion: whether an image that is foreseen from motion is seen as well, and mended."""
+    motion: whether an image that motion predicts is seen as well, and refined."""
 
     widths: tuple[int, int, int] = (32, 96, 192)
     blocks: int = 6
@@ -32,7 +32,7 @@ class ConvolutionalShape:
 
     @property
     def seen(self) -> int:
-        """Images that the network is given: frames before, oldest first, and last the one that is foreseen."""
+        """Images that the network is given: frames before, oldest first, and last the predicted one."""
         return self.frames + self.motion
 
 
@@ -72,13 +72,13 @@ class ConvolutionalNet(nn.Module):
             nn.ReLU(),
             nn.Conv2d(first, 3 + shape.motion, 3, padding=1),
         )
-        nn.init.zeros_(self.out[-1].weight)  # a new one repeats the last frame, or half of that and what is foreseen
+        nn.init.zeros_(self.out[-1].weight)  # a new one repeats the last frame, or half of that and of the prediction
         nn.init.zeros_(self.out[-1].bias)
 
     def forward(self, before: Tensor, times: Tensor) -> Tensor:
         """before [B, seen, 3, 64, 64] in -1..1, oldest first; times [B, 2] of `times_ahead` -> [B, 3, 64, 64].
 
-        What the last frame changes by is learnt; and how much of the image is that, the rest being what is foreseen.
+        What the last frame changes by is learnt; and how much of the image is that, the rest being the prediction.
         """
         fine = self.fine(before.flatten(1, 2))
         half = self.middle(fine)
@@ -92,8 +92,8 @@ class ConvolutionalNet(nn.Module):
         return before[:, -1] + share * (own - before[:, -1])
 
     def begin_with(self, other: ConvolutionalNet) -> None:
-        """Takes over the weights of a network of the same widths and blocks; where that sees no image that is
-        foreseen, and this one does, half of its image and half of that."""
+        """Takes over the weights of a network of the same widths and blocks; where that sees no
+        predicted image, and this one does, half of its image and half of that."""
         known = other.state_dict()
         for name, own in self.state_dict().items():
             grown = torch.zeros_like(own)

@@ -8,7 +8,7 @@ from torch import Tensor
 from export.prediction.autoencoder import Autoencoder
 
 HORIZONS = (1, 3, 8)
-_CAP_DB = 50.0  # of one picture: equal images would make every mean infinite
+_CAP_DB = 50.0  # of one image: equal images would make every mean infinite
 
 
 def psnr_db(a: Tensor, b: Tensor) -> Tensor:

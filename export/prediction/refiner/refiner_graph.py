@@ -1,7 +1,7 @@
-"""The network that mends what motion predicts, as an ONNX graph.
+"""The refiner of the SDK's predictions, as an ONNX graph.
 
-`mended.onnx`: pictures float32 [1, 64, 64, seen * 3], R, G, B in 0..255 of each frame before, oldest first, and last of
-what motion predicts; times [1, 2] of `times_ahead` -> picture [1, 64, 64, 3].
+`mended.onnx`: images float32 [1, 64, 64, seen * 3], R, G, B in 0..255 of each frame before, oldest first, and last of
+what motion predicts; times [1, 2] of `times_ahead` -> image [1, 64, 64, 3].
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from export.densepose.graphs import session
 from export.onnx_graphs import largest_difference, write_graph
 from export.prediction.refiner.convolutional import ConvolutionalNet, times_ahead
 
-MENDED = "mended"
+REFINED = "mended"
 TOLERANCE = 1e-4  # largest |ONNX - torch|, relative to the largest number
 
 
-class MendedGraph(nn.Module):
+class RefinedGraph(nn.Module):
     def __init__(self, net: ConvolutionalNet) -> None:
         super().__init__()
         self.net = net
@@ -32,7 +32,7 @@ class MendedGraph(nn.Module):
 
 
 @torch.no_grad()
-def export_mended(net: ConvolutionalNet, folder: Path) -> float:
+def export_refined(net: ConvolutionalNet, folder: Path) -> float:
     """Writes the graph; returns how far it is from torch. Raises ValueError where that is too far, and for a network
     that is not shown motion."""
     if not net.shape.motion:
@@ -41,8 +41,8 @@ def export_mended(net: ConvolutionalNet, folder: Path) -> float:
     rng = np.random.default_rng(0)
     pictures = torch.from_numpy(rng.uniform(0, 255, (1, SIDE_PX, SIDE_PX, net.shape.seen * 3)).astype(np.float32))
     times = times_ahead(torch.tensor([15.0]), torch.tensor([4.0]))
-    path = folder / f"{MENDED}.onnx"
-    write_graph(MendedGraph(net), [pictures, times], path, ["pictures", "times"], ["picture"])
+    path = folder / f"{REFINED}.onnx"
+    write_graph(RefinedGraph(net), [pictures, times], path, ["pictures", "times"], ["picture"])
     (made,) = session(path).run(None, {"pictures": pictures.numpy(), "times": times.numpy()})
     frames = pictures.unflatten(3, (-1, 3)).permute(0, 3, 1, 2, 4)
     error = largest_difference(net.predicted(frames, times).numpy(), made)

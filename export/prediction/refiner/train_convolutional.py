@@ -1,12 +1,12 @@
 """Trains the convolutional network that predicts frames without codes; goes on where it was stopped.
 
     python -m export.prediction.refiner.train_convolutional --sets pushing shapes --minutes 120
-    python -m export.prediction.refiner.auto_predictions         # first, for the one that mends what the SDK foresees:
-    python -m export.prediction.refiner.train_convolutional --foreseen .data/prediction/foreseen \\
+    python -m export.prediction.refiner.auto_predictions    # first, for the one that refines the SDK's predictions:
+    python -m export.prediction.refiner.train_convolutional --predictions .data/prediction/auto \\
         --sets pushing collages --out .data/runs/prediction-refiner
 
 Writes checkpoint.pt, weights.pt, log.json and curves.png to --out. Metrics are PSNR of held-out clips, dB, by frames
-ahead: `network H`, beside the image that it changes (the last frame, or what is foreseen), `base H`.
+ahead: `network H`, beside the image that it changes (the last frame, or the prediction), `base H`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from torch import Tensor
 from export.prediction import run
 from export.prediction.data import Clips, read_clips
 from export.prediction.motion_images import HORIZONS
-from export.prediction.refiner.auto_predictions import read_foreseen
+from export.prediction.refiner.auto_predictions import read_predictions
 from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
 from export.prediction.refiner.image_error import psnr_db
 
@@ -34,9 +34,9 @@ class Training(run.Training):
         net = ConvolutionalNet(shape).train().to(device, memory_format=torch.channels_last)  # faster by a third
         super().__init__(net, torch.optim.AdamW(net.parameters(), betas=(0.9, 0.99), weight_decay=0.01), bf16)
 
-    def advance(self, clips: Clips, foreseen: Tensor | None, count: int, rate: float) -> dict[str, Tensor]:
-        """One step on `count` frames at random, at that learning rate. foreseen uint8 [N, T, horizons, 64, 64, 3]: what
-        is changed, instead of the last frame, where the network sees it.
+    def advance(self, clips: Clips, predictions: Tensor | None, count: int, rate: float) -> dict[str, Tensor]:
+        """One step on `count` frames at random, at that learning rate. predictions uint8 [N, T, horizons, 64, 64, 3]:
+        they are changed, instead of the last frame, where the network sees them.
 
         The loss is the squared error by that of the image that is changed: hard clips and far times would have nearly
         all of a plain one.
@@ -44,13 +44,13 @@ class Training(run.Training):
         device, total = self.device, clips.frames.shape[1]
         horizon = torch.randint(len(HORIZONS), (count,), device=device)
         ahead = torch.randint(1, HORIZONS[-1] + 1, (count,), device=device)
-        if foreseen is not None:
+        if predictions is not None:
             ahead = torch.tensor(HORIZONS, device=device)[horizon]
         clip = torch.randint(len(clips), (count,), device=device)
         now = 1 + (torch.rand(count, device=device) * (total - 1 - ahead)).long()
         before, truth = frames_of(clips, clip, now, self.net.shape.frames), clips.frames[clip, now + ahead]
-        if foreseen is not None:
-            before = torch.cat([before, foreseen[clip, now, horizon][:, None]], 1)
+        if predictions is not None:
+            before = torch.cat([before, predictions[clip, now, horizon][:, None]], 1)
         before, truth = as_elsewhere(before, truth)
         with self.autocast():
             made = self.net.predicted(before, times_ahead(clips.fps[clip], ahead.float()))
@@ -79,7 +79,7 @@ def frames_of(clips: Clips, clip: Tensor, now: Tensor, count: int) -> Tensor:
 
 
 @torch.no_grad()
-def figures_of(net: ConvolutionalNet, clips: Clips, foreseen: Tensor | None, frames: int) -> dict[str, float]:
+def figures_of(net: ConvolutionalNet, clips: Clips, predictions: Tensor | None, frames: int) -> dict[str, float]:
     """PSNR on held-out clips: `frames` frames for each time ahead, spread evenly over clips and times."""
     figures: dict[str, float] = {}
     device, seen = clips.frames.device, net.shape.frames
@@ -91,7 +91,7 @@ def figures_of(net: ConvolutionalNet, clips: Clips, foreseen: Tensor | None, fra
             clip, now = some // times, seen + some % times
             before, truth = frames_of(clips, clip, now, seen), clips.frames[clip, now + ahead]
             told = times_ahead(clips.fps[clip], torch.full((len(some),), float(ahead), device=device))
-            shown = before if foreseen is None else torch.cat([before, foreseen[clip, now, h][:, None]], 1)
+            shown = before if predictions is None else torch.cat([before, predictions[clip, now, h][:, None]], 1)
             network.append(psnr_db(net.predicted(shown, told), truth))
             base.append(psnr_db(shown[:, -1], truth))
         figures[f"network {ahead}"] = float(torch.cat(network).mean())
@@ -113,10 +113,10 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--sets", nargs="+", default=["pushing", "shapes"], help="default %(default)s")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/prediction-convolutional"))
     parser.add_argument(
-        "--foreseen", type=Path, nargs="+", help="what pictures.foreseen wrote, instead of --data: mends that"
+        "--predictions", type=Path, nargs="+", help="what auto_predictions wrote, instead of --data: refines these"
     )
     parser.add_argument("--validate-sets", nargs="+", help="default: as --sets")
-    parser.add_argument("--init", type=Path, help="weights to begin from, with or without what is foreseen")
+    parser.add_argument("--init", type=Path, help="weights to begin from, with or without the prediction")
     parser.add_argument("--validate-frames", type=int, default=256, help="a time ahead (default %(default)s)")
     run.add_arguments(parser, minutes=120, batch=16, rate=1e-3)
     return parser.parse_args()
@@ -127,22 +127,23 @@ def train(arguments: argparse.Namespace) -> None:
     run.begin(arguments)
     device = torch.device(arguments.device)
     held_out_sets = arguments.validate_sets or arguments.sets
-    foreseen = held_out_foreseen = None
-    if arguments.foreseen:
+    predictions = held_out_predictions = None
+    if arguments.predictions:
         train, val = (
-            read_foreseen(arguments.foreseen, sets, split).on(device)
+            read_predictions(arguments.predictions, sets, split).on(device)
             for sets, split in ((arguments.sets, "train"), (held_out_sets, "val"))
         )
-        (clips, foreseen), (held_out, held_out_foreseen) = ((of.clips, of.pictures) for of in (train, val))
+        (clips, predictions), (held_out, held_out_predictions) = ((of.clips, of.pictures) for of in (train, val))
     else:
         clips = read_clips(arguments.data, arguments.sets, "train").on(device)
         held_out = read_clips(arguments.data, held_out_sets, "val").on(device)
-    training = Training(ConvolutionalShape(motion=foreseen is not None), arguments.bf16, arguments.device)
+    training = Training(ConvolutionalShape(motion=predictions is not None), arguments.bf16, arguments.device)
     if arguments.init:
         training.net.begin_with(load_convolutional(arguments.init))
     run.run(
-        training, arguments, lambda rate: training.advance(clips, foreseen, arguments.batch, rate),
-        lambda: figures_of(training.net, held_out, held_out_foreseen, arguments.validate_frames), "held out: PSNR, dB",
+        training, arguments, lambda rate: training.advance(clips, predictions, arguments.batch, rate),
+        lambda: figures_of(training.net, held_out, held_out_predictions, arguments.validate_frames),
+        "held out: PSNR, dB",
     )  # fmt: skip
 
 

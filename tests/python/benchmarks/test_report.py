@@ -125,7 +125,7 @@ def test_a_report_of_one_section_shows_that_section(tmp_path, section):
     assert headings[0] == "## Targets"
 
 
-def test_a_report_holds_metrics_pictures_warnings_and_its_commit(tmp_path):
+def test_a_report_holds_metrics_images_warnings_and_its_commit(tmp_path):
     written = report.write(document(), tmp_path)
     assert all(path.stat().st_size > 1000 for path in written if path.suffix == ".png")
     text, page = (tmp_path / "report.md").read_text(), (tmp_path / "index.html").read_text()
@@ -142,7 +142,7 @@ def test_a_report_holds_metrics_pictures_warnings_and_its_commit(tmp_path):
 
 def published(tmp_path, **changed):
     """Publishes a document with some stamps changed; returns the refusal and the published files."""
-    shown = ("machine", "threads", "targets", "measured", "startup", "cameras", "scenes")  # without pictures: quick
+    shown = ("machine", "threads", "targets", "measured", "startup", "cameras", "scenes")  # without images: quick
     found = {name: own for name, own in document().items() if name in shown} | {"quick": False} | changed
     (tmp_path / "out").mkdir(exist_ok=True)
     picture, path = tmp_path / "out" / "stages.png", tmp_path / "out" / "benchmark.json"

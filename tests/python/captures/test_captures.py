@@ -42,7 +42,7 @@ def seen_wall(camera: Camera, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 @pytest.fixture(scope="module")
 def wall():
-    """Five cameras before a wall, their pictures and depth."""
+    """Five cameras before a wall, their images and depth."""
     rng = np.random.default_rng(0)
     pattern = cv2.GaussianBlur(rng.uniform(0, 255, (400, 400)).astype(np.float32), (0, 0), 3)
     pattern = np.clip(128 + 6 * (pattern - 128), 0, 255)
@@ -82,7 +82,7 @@ def test_points_are_kept_where_views_agree(wall):
     assert np.quantile(np.abs(xyz[:, 1]), 0.95) < 0.04  # of 2
     assert 4000 < len(fused(cameras, images, depths, max_points=5000)[0]) <= 5000
     assert len(fused(cameras, images, depths, min_witnesses=4)[0]) < len(xyz)
-    # Pictures of nothing in common make no cloud.
+    # Images of nothing in common make no cloud.
     rng = np.random.default_rng(1)
     noise = [rng.integers(0, 255, image.shape, dtype=np.uint8) for image in images]
     with pytest.raises(CaptureError, match="points"):
@@ -108,7 +108,7 @@ def test_the_mask_is_the_hull_of_the_yellow_box():
     frame = np.full((240, 320, 3), (160, 150, 150), np.uint8)
     corners = np.array([(60, 60), (200, 40), (240, 150), (90, 180)])
     cv2.fillConvexPoly(frame, corners, (20, 170, 230))
-    frame[80:130, 110:180] = (200, 60, 30)  # its picture is blue
+    frame[80:130, 110:180] = (200, 60, 30)  # its image is blue
     wanted = cv2.fillConvexPoly(np.zeros((240, 320), np.uint8), corners, 255)
     both = box_mask(frame) & wanted
     assert both.sum() > 0.97 * wanted.sum()

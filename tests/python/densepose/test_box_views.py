@@ -1,4 +1,4 @@
-"""Views of pictures to learn from, and what their boxes show."""
+"""Views of images to learn from, and what their boxes show."""
 
 import cv2
 import numpy as np
@@ -45,7 +45,7 @@ def test_boxes_on_somebody_unsure_are_left_out_and_those_beside_are_nobody():
     assert match[0] == 0
 
 
-def test_a_file_that_is_no_picture_is_named(tmp_path):
+def test_a_file_that_is_no_image_is_named(tmp_path):
     (tmp_path / "torn.jpg").write_bytes(b"not a photo")
     with pytest.raises(ValueError, match=r"torn\.jpg is not an image"):
         without_people(tmp_path)

@@ -81,7 +81,7 @@ def test_a_crops_labels_come_back_to_their_pixels(degrees):
     assert np.abs(back[inner, 1].astype(int) - label[inner, 1]).mean() < 12
 
 
-def test_crops_of_a_picture_go_through_the_network_together():
+def test_crops_of_an_image_go_through_the_network_together():
     torch.manual_seed(0)
     net = MobileParsingRCNN(NetworkConfig(width=16)).eval()
     image, label = picture(np.random.default_rng(0), people=2)

@@ -1,4 +1,4 @@
-"""The reference decode gives a right picture, also for networks and images that are not well behaved."""
+"""The reference decode gives a right image, also for networks and images that are not well behaved."""
 
 import dataclasses
 import math
@@ -53,7 +53,7 @@ def assert_sound(result, image) -> None:
     assert result.instance.max() <= len(result.boxes)
 
 
-def test_nobody_gives_an_empty_picture():
+def test_nobody_gives_an_empty_image():
     result = infer(fake_graphs(person=-10), IMAGE, CONFIG, DECODE)
     assert len(result.boxes) == 0
     assert not result.iuv.any()
@@ -69,7 +69,7 @@ def test_people_are_painted_with_their_part_and_coordinates():
 def test_evidence_is_added_to_the_logit_of_a_person():
     plain = infer(fake_graphs(person=2.0), IMAGE, CONFIG, DECODE)
     less = infer(fake_graphs(person=2.0, evidence=-1.0), IMAGE, CONFIG, DECODE)
-    # The larger part of a box in the picture's corner lies on the map, where the evidence is the same everywhere.
+    # The larger part of a box in the image's corner lies on the map, where the evidence is the same everywhere.
     assert less.scores.min() == pytest.approx(torch.tensor(1.0).sigmoid().item(), abs=1e-4)
     assert plain.scores.min() == pytest.approx(torch.tensor(2.0).sigmoid().item(), abs=1e-6)
     assert len(infer(fake_graphs(person=2.0, evidence=-3.0), IMAGE, CONFIG, DECODE).boxes) == 0
@@ -211,6 +211,6 @@ def test_an_untrained_network_runs_end_to_end():
     assert list(result.scores) == sorted(result.scores, reverse=True)
 
 
-def test_boxes_are_clipped_at_the_picture_not_at_its_padding():
+def test_boxes_are_clipped_at_the_image_not_at_its_padding():
     boxes = bx.clip(torch.tensor([[-5.0, -5.0, 500.0, 500.0]]), 120, 160)
     assert boxes.tolist() == [[0, 0, 160, 120]]

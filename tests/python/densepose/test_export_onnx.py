@@ -144,7 +144,7 @@ def test_parity_covers_the_networks_of_crops(net, crop_net, full_folder):
     assert mistaken["crop_dense_head.u"] > export_onnx.TOLERANCE
 
 
-def test_parity_on_pictures_is_measured_for_every_output(net, folder):
+def test_parity_on_images_is_measured_for_every_output(net, folder):
     image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
     errors = export_onnx.parity(net, folder, [image])
     assert len(errors) == 6 + 1 + 4 + 1 + 4

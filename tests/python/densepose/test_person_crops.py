@@ -21,7 +21,7 @@ NO_AUTOCAST = torch.autocast("cpu", enabled=False)
 
 
 def tilted(degrees: float, seed: int = 0, people: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A picture of upright people, turned clockwise, with their axes."""
+    """An image of upright people, turned clockwise, with their axes."""
     image, label = picture(np.random.default_rng(seed), people=people)
     height, width = label.shape[:2]
     matrix = cv2.getRotationMatrix2D((width / 2 - 0.5, height / 2 - 0.5), -degrees, 1.0)
@@ -86,7 +86,7 @@ def test_nobody_is_looked_at_where_nobody_is():
         assert not tg.dense_labels(truth.box, torch.tensor([0]), truth, 32).any()
 
 
-def test_a_mirrored_picture_has_the_mirrored_axis():
+def test_a_mirrored_image_has_the_mirrored_axis():
     record = as_record(*tilted(40, seed=4))
     signs = set()
     for seed in range(8):

@@ -55,7 +55,7 @@ def test_ignored_people_are_neither_positive_nor_negative(anchors):
     assert (box_iou(anchors, people.box)[negative, 0] <= 0.3).all()
 
 
-def test_a_picture_without_people_gives_negatives_only(anchors):
+def test_an_image_without_people_gives_negatives_only(anchors):
     positive, target, negative = tg.rpn_samples(anchors, truth([]), 64)
     assert (len(positive), tuple(target.shape), len(negative)) == (0, (0, 4), 64)
 
@@ -119,7 +119,7 @@ def test_a_mirrored_cut_carries_the_mirrored_labels():
         columns = {part: np.nonzero(marked[..., 0] == part)[1] for part in (9, 10, 23, 24)}
         if min(len(c) for c in (columns[9], columns[10])) < 20:
             continue
-        # Part 9 is to the left of part 10 in the picture, and stays so: mirroring swaps places and names.
+        # Part 9 is to the left of part 10 in the image, and stays so: mirroring swaps places and names.
         assert columns[9].mean() < columns[10].mean()
         # U rises to the right in part 9; V of it is turned round in a mirror.
         inside = marked[..., 0] == 9

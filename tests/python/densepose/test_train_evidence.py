@@ -18,7 +18,7 @@ BOXES = torch.tensor([[8, 8, 100, 120], [30, 20, 90, 110], [60, 4, 124, 100]]).f
 
 @pytest.fixture(scope="module")
 def seen() -> list[View]:
-    """Two kinds of pictures, which the backbone's maps tell apart; the box head takes both for people."""
+    """Two kinds of images, which the backbone's maps tell apart; the box head takes both for people."""
     torch.manual_seed(0)
     made = []
     for k in range(16):
@@ -33,7 +33,7 @@ def likely(evidence: PersonEvidence, view: View) -> torch.Tensor:
         return (view.logit + mean_evidence(evidence(view.fine.float(), view.coarse.float()), view.boxes)).sigmoid()
 
 
-def test_pictures_without_people_become_nobody_and_scores_of_all_others_stay(seen):
+def test_images_without_people_become_nobody_and_scores_of_all_others_stay(seen):
     evidence = train_evidence.fit(seen, steps=200, rate=5e-3, seed=0)
     for view in seen:
         if view.keeps:

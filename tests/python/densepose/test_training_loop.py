@@ -28,7 +28,7 @@ def shards(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def short_pictures(monkeypatch, one_thread, signal_handlers):
+def short_images(monkeypatch, one_thread, signal_handlers):
     monkeypatch.setitem(train.RECIPES, "scratch", (train.Stage(0.0, (96,)),))
 
 
@@ -115,7 +115,7 @@ def test_a_run_learns_the_surface_first_and_resumes_across_the_stages(monkeypatc
     assert first + second == pytest.approx(straight, rel=1e-5)
 
 
-def test_the_surface_alone_is_learnt_on_a_few_pictures(shards):
+def test_the_surface_alone_is_learnt_on_a_few_images(shards):
     torch.manual_seed(0)
     image, truths = data.Batches(load_records(shards / "train"), 4, seed=0).make(0, (96,), data.CLOSE_CROPPING)
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
@@ -146,7 +146,7 @@ def test_close_crops_show_people_larger(shards):
     assert covered[data.CLOSE_CROPPING] > 1.2 * covered[data.ANY_CROPPING]
 
 
-def test_the_loss_falls_on_a_few_pictures(shards):
+def test_the_loss_falls_on_a_few_images(shards):
     torch.manual_seed(0)
     batches = data.Batches(load_records(shards / "train"), 4, seed=0)
     fixed = [batches.make(k, (96,)) for k in range(2)]
@@ -176,7 +176,7 @@ def test_every_weight_gets_a_gradient(shards):
     assert [name for name, p in net.named_parameters() if p.grad is None] == []
 
 
-def test_pictures_without_people_can_be_learnt_from():
+def test_images_without_people_can_be_learnt_from():
     net = MobileParsingRCNN(NetworkConfig(width=16)).train()
     label = np.zeros((64, 64, 4), np.uint8)
     truths = [data.truth_of(label), data.truth_of(label)]

@@ -32,7 +32,7 @@ def test_matched_pairs_have_the_depth_of_their_disparity():
     assert np.median(depth[depth > 0]) == pytest.approx(300 * 0.06 / 15, rel=0.01)
 
 
-def test_pictures_that_have_nothing_in_common_are_told():
+def test_images_that_have_nothing_in_common_are_told():
     with pytest.raises(MatchingError, match="features"):
         uncalibrated(texture((120, 160), 1), texture((120, 160), 2), 150)
 

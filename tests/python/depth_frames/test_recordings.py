@@ -87,7 +87,7 @@ def test_a_camera_that_is_not_known_is_told(tmp_path, camera, wanted):
         frames_of(recording(tmp_path / "a.maqrec", frame(7, millimetres(1)), camera=camera))
 
 
-def test_pictures_without_depth_are_told(tmp_path):
+def test_images_without_depth_are_told(tmp_path):
     with pytest.raises(RecordingError, match="no frame of depth"):
         frames_of(recording(tmp_path / "a.maqrec", frame(1, np.zeros((32, 40, 3), np.uint8))))
 

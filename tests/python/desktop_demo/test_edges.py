@@ -57,7 +57,7 @@ def on_screen(picture, camera, points) -> np.ndarray:
 
 
 def near(picture, colour, error: int = 24) -> np.ndarray:
-    """Pixels of that colour: bool [height, width] of the shown picture."""
+    """Pixels of that colour: bool [height, width] of the shown image."""
     return np.abs(picture.rectangle("picture_px").astype(int) - colour).max(-1) < error
 
 

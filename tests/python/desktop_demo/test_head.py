@@ -52,7 +52,7 @@ def test_a_head_stands_beside_its_photo(shown):
     assert np.abs(wide[top : top + side, :side][inner, inner].astype(int) - expected[inner, inner]).mean() < 6
 
 
-def test_normals_are_another_picture_of_the_same_head(shown):
+def test_normals_are_another_image_of_the_same_head(shown):
     colour, normals = shown["colour"], shown["normals"]
     assert normals.report["head"]["shading"] == "normals"
     assert colour.report["picture_px"] == normals.report["picture_px"]

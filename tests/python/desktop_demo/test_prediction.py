@@ -63,7 +63,7 @@ def test_the_last_frame_is_now(tmp_path):
     assert has_border(shown.rectangle("next_px"))
 
 
-def test_auto_says_how_much_of_the_picture_is_motions(tmp_path):
+def test_auto_says_how_much_of_the_image_is_motions(tmp_path):
     shown = show(tmp_path, "--predict", PEOPLE, "--ahead", 100, "--frames", 20)
     fraction = shown.report["prediction"]["motion_fraction"]
     assert shown.report["prediction"]["method"] == ("last" if fraction == 0 else "motion" if fraction == 1 else "auto")
@@ -99,7 +99,7 @@ def test_a_stall_is_filled_with_frames_that_are_counted(tmp_path):
 
 def test_a_predicted_frame_has_a_border_and_the_switch_is_a_key():
     def now(hands):
-        """The upper of the two pictures; the demo's window is 1280 x 800 and the panel 330 wide."""
+        """The upper of the two images; the demo's window is 1280 x 800 and the panel 330 wide."""
         return hands.see()[0:400, 208:741]
 
     def shows_people(hands):
@@ -132,7 +132,7 @@ def clip_with_a_cut(path, frames=20):
     return path
 
 
-def test_a_cut_is_an_event_in_the_curve_and_red_in_the_picture(tmp_path):
+def test_a_cut_is_an_event_in_the_curve_and_red_in_the_image(tmp_path):
     clip = clip_with_a_cut(tmp_path / "cut.mp4")
     at_the_cut = show(tmp_path, "--predict", "--novelty", clip, "--frames", 21)
     assert at_the_cut.report["novelty"]["events_s"] == [pytest.approx(1.0, abs=0.03)]
@@ -152,7 +152,7 @@ def test_a_cut_is_an_event_in_the_curve_and_red_in_the_picture(tmp_path):
 
 def test_novelty_is_switched_by_a_key_and_the_image_goes_on_without_its_network():
     def curve(hands):
-        """The lowest rows of the window where the pictures are."""
+        """The lowest rows of the window where the images are."""
         return hands.see()[770:795, 208:741].astype(int)
 
     with demo("--predict", PEOPLE) as hands:

@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("Xvfb") is None, reason="no Xvfb (scripts/install-packages.sh test)"),
 ]
 
-# The walkers of the first are three in their 16th frame, one of them at the picture's edge.
+# The walkers of the first are three in their 16th frame, one of them at the image's edge.
 SOURCES = {"walkers": ("stub:people?count=3&seed=3", 16), "clip": (f"video:{ROOT}/tests/media/clip.mp4", 30)}
 
 
@@ -48,7 +48,7 @@ def shown(source, tmp_path_factory):
 
 
 def darkening(picture: np.ndarray, mapped: Mapped, where: np.ndarray) -> float:
-    """The one factor by which the camera's picture is shown there, after asserting that it is one."""
+    """The one factor by which the camera's image is shown there, after asserting that it is one."""
     ours, theirs = mapped.frame[where].astype(float), picture[where].astype(float)
     factor = float((ours * theirs).sum() / (ours * ours).sum())
     error = np.abs(theirs - factor * ours).max(-1)

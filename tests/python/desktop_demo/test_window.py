@@ -30,7 +30,7 @@ def test_views_by_key_and_files_by_drop(tmp_path):
         hands.until(lambda: not hands.looks_like(photo, 20), "another view of it, with a dark background")
         hands.press("1")
         hands.until(lambda: hands.looks_like(photo), "the camera's view again")
-        # In the try-on view a picture is worn instead of opened.
+        # In the try-on view an image is worn instead of opened.
         flat = np.full((300, 200, 3), (40, 220, 60), np.uint8)
         cv2.imwrite(str(tmp_path / "green.png"), flat)
         hands.press("6")

@@ -84,7 +84,7 @@ def from_left_to_right(found):
 
 @needs_library
 @pytest.mark.parametrize("size", [(320, 256), (256, 320), (331, 207), (640, 512)])
-def test_both_ways_give_the_same_people_and_the_same_picture(size, bundle_without_ties, monkeypatch):
+def test_both_ways_give_the_same_people_and_the_same_image(size, bundle_without_ties, monkeypatch):
     pytest.importorskip("torch", reason="the reference of decoding needs torch: scripts/make-venv.sh train,dev")
     from export.densepose import decode
 

@@ -11,7 +11,7 @@ HEIGHT, WIDTH = 60, 80
 
 @pytest.fixture
 def image() -> LabelledImage:
-    """One upright person and one whom the label is not sure of; the picture tells where it came from."""
+    """One upright person and one whom the label is not sure of; the image tells where it came from."""
     rng = np.random.default_rng(0)
     label = np.zeros((HEIGHT, WIDTH, 4), np.uint8)
     label[10:50, 20:32] = [3, 100, 200, 1]
@@ -25,7 +25,7 @@ def image() -> LabelledImage:
     )  # fmt: skip
 
 
-def test_no_turn_puts_the_picture_on_a_square_that_holds_any_turn(image):
+def test_no_turn_puts_the_image_on_a_square_that_holds_any_turn(image):
     turned = rolled(image, 0)
     assert turned.image.shape == (100, 100, 3)
     assert turned.box.tolist() == [[30, 30, 42, 70], [70, 40, 80, 60]]

@@ -14,7 +14,7 @@ from export.evaluation.backends import Prediction, fingerprint, open_backend
 from export.evaluation.json_values import plain
 from export.evaluation.measure import Figures, Tally, image_ranges, measure
 from export.evaluation.paint import mosaic, paint
-from export.evaluation.plot import write_picture
+from export.evaluation.plot import write_image
 from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap, sample_pixels
 from export.jobs import Workers
 from export.shards import ShardError, read_image, read_images, shard_paths
@@ -179,7 +179,7 @@ def test_pixels_of_a_missed_person_count_as_wrong(folder):
     assert result.ap_box_50 == pytest.approx(67 / 101)  # two of three people asked for
 
 
-def test_people_below_the_score_threshold_enter_ap_but_not_the_picture(folder):
+def test_people_below_the_score_threshold_enter_ap_but_not_the_image(folder):
     def doubt(prediction):
         return Prediction(prediction.box, prediction.score - 0.6, prediction.iuv, prediction.inds)
 
@@ -293,7 +293,7 @@ def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
     document = json.loads((tmp_path / "e.json").read_text(), parse_constant=pytest.fail)
     assert document["results"]["int8 capi"]["images"] == 2
     assert document["results"]["int8 capi"]["photos"] is None
-    write_picture(tmp_path / "e.png", results, {})
+    write_image(tmp_path / "e.png", results, {})
     assert cv2.imread(str(tmp_path / "e.png")) is not None
 
 

@@ -50,7 +50,7 @@ def test_nothing_is_said_without_two_views_of_somebody():
     assert np.isnan(views.judge_views(labels, CAMERAS).median_px)
 
 
-def test_a_smaller_picture_gives_the_same_rays():
+def test_a_smaller_image_gives_the_same_rays():
     full = CAMERAS[0].rays(np.array([[40, 80]]), SIZE[::-1])
     # The middle of the pixel twice as large that covers it lies half a pixel farther.
     half = CAMERAS[0].rays(np.array([[20, 40]]), (160, 90))

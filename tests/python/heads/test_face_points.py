@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from export.heads.head_shards import POINT_SCALE, HeadPictures
+from export.heads.head_shards import POINT_SCALE, HeadImages
 from export.heads.photos import face_points
 from export.heads.photos.face_points import FacePoints, median_points, on_template, read_face_points, write_face_points
 from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, FacePose, matte_of, photo_faces, pose_of, weights_of
@@ -49,7 +49,7 @@ def test_the_file_comes_back_as_it_was_written(tmp_path):
     assert face_points.FILE.stat().st_size < 60_000
 
 
-def flat_pictures() -> HeadPictures:
+def flat_images() -> HeadImages:
     """A wall at y = -1 whose template point is (column / 100, -1, -row / 100), in the left half of 256 px."""
     rows, columns = np.mgrid[:256:2, :256:2]
     template = np.stack([columns / 100, np.full(rows.shape, -1.0), -rows / 100], -1)
@@ -59,7 +59,7 @@ def flat_pictures() -> HeadPictures:
     masks = np.zeros((1, 256, 256), np.uint8)
     masks[:, :, :128] = 255
     rotation = np.array([[[1, 0, 0], [0, 0, -1], [0, 1, 0]]], np.float64)  # the head's y is the camera's z
-    return HeadPictures(
+    return HeadImages(
         np.zeros((1, 256, 256, 3), np.uint8), masks, np.round(template * POINT_SCALE).astype(np.int16)[None], normal,
         rotation, np.array([[0, 0, 10.0]]), np.array([[400, 127.5, 127.5]]),
     )  # fmt: skip
@@ -67,7 +67,7 @@ def flat_pictures() -> HeadPictures:
 
 def test_template_points_are_read_between_the_stored_pixels_and_nowhere_off_the_head():
     place, normal = on_template(
-        flat_pictures(), 0, np.array([[51.0, 40.5], [200.0, 40.0], [-5.0, 3.0], [126.9, 9.0], [98.8, 9.0]])
+        flat_images(), 0, np.array([[51.0, 40.5], [200.0, 40.0], [-5.0, 3.0], [126.9, 9.0], [98.8, 9.0]])
     )
     assert np.allclose(place[0], [0.51, -1, -0.405], atol=2e-4)
     assert np.allclose(normal[0], [0, -1, 0], atol=1e-6)

@@ -1,4 +1,4 @@
-"""Pictures drawn in torch show what rays show; the pack keeps shapes."""
+"""Images drawn in torch show what rays show; the pack keeps shapes."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from export.people import assets
 
 
 def test_the_nearer_triangle_is_seen_and_weights_are_of_the_surface():
-    """Two triangles before a camera of focal length 10, whose planes cross in the picture, and one behind it."""
+    """Two triangles before a camera of focal length 10, whose planes cross in the image, and one behind it."""
     points = torch.tensor([
         [[-4.0, -4, 8], [6, -4, 2], [-4, 6, 8]],
         [[-4.0, -4, 3], [6, -4, 12], [-4, 6, 3]],
@@ -32,7 +32,7 @@ def test_the_nearer_triangle_is_seen_and_weights_are_of_the_surface():
         assert (depth[alone.pixel] >= alone.nearness - 1e-7).all()
 
 
-def test_candidates_in_parts_and_several_pictures(monkeypatch):
+def test_candidates_in_parts_and_several_images(monkeypatch):
     random = torch.Generator().manual_seed(0)
     corners = 40 * torch.rand(60, 1, 2, generator=random) + 12 * torch.rand(60, 3, 2, generator=random) - 6
     nearness, picture = 0.1 + torch.rand(60, 3, generator=random), torch.arange(60) % 3
@@ -52,7 +52,7 @@ needs_assets = pytest.mark.skipif(
 
 
 def meshes_of(head, cameras, lamps, extras):
-    """`Meshes` of one whole head with what is inside left out, as the pictures with rays have it."""
+    """`Meshes` of one whole head with what is inside left out, as the images with rays have it."""
     from export.heads.encoder_training.generator import BUST, Meshes, extras_row, lamp_row
     from export.heads.shapes import vertex_normals
 
@@ -84,14 +84,14 @@ def meshes_of(head, cameras, lamps, extras):
 
 
 @needs_assets
-def test_pictures_are_those_of_rays():
+def test_images_are_those_of_rays():
     from export.heads.encoder_data import face_box_of
     from export.heads.encoder_training.head_images import Painter
     from export.heads.encoder_training.pack import right_eye
-    from export.heads.head_shards import HeadPictures
+    from export.heads.head_shards import HeadImages
     from export.heads.sampling import sample_camera, sample_extras, sample_lamps
     from export.heads.synthetic_heads import make_head, make_maker
-    from export.heads.view_shards import picture_row
+    from export.heads.view_shards import image_row
     from export.heads.views import HeadViews
 
     maker, rng = make_maker(), np.random.default_rng(5)
@@ -100,8 +100,8 @@ def test_pictures_are_those_of_rays():
     cameras = [sample_camera(points[points[:, 2] > -1.6], rng) for _ in range(3)]
     lamps, extras = [sample_lamps(rng) for _ in range(3)], sample_extras(rng)
     views = HeadViews(head, extras)
-    rows = [picture_row(views.seen(c, lamp)) for c, lamp in zip(cameras, lamps, strict=True)]
-    rays = HeadPictures(*(np.stack(column) for column in zip(*rows, strict=True)))
+    rows = [image_row(views.seen(c, lamp)) for c, lamp in zip(cameras, lamps, strict=True)]
+    rays = HeadImages(*(np.stack(column) for column in zip(*rows, strict=True)))
     eye = torch.from_numpy(right_eye(maker.shapes))
     painter = Painter(torch.from_numpy(maker.skin.astype(np.uint8)), eye, torch.device("cpu"), 0)
     meshes = meshes_of(head, cameras, lamps, extras)

@@ -11,7 +11,7 @@ from export.heads.photos.judge import batched_photos, crop_photo  # noqa: E402
 
 
 def faces() -> PhotoFaces:
-    """A black picture with one white dot where its second point is seen; the left half head, a column unknown."""
+    """A black image with one white dot where its second point is seen; the left half head, a column unknown."""
     rgb = np.zeros((1, 256, 256, 3), np.uint8)
     rgb[0, 97:104, 117:124] = 255
     matte = np.full((1, 256, 256), NOTHING, np.uint8)

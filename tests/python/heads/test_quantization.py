@@ -1,5 +1,7 @@
 """An int8 bundle of heads: what it is made of, what it says of its losses, and what is refused."""
 
+import contextlib
+import io
 import json
 import shutil
 import sys
@@ -18,7 +20,7 @@ from export.bundle import BundleInfo, read_manifest
 from export.heads.bundle import write_manifest
 from export.heads.encoder_data import Crop
 from export.heads.export_onnx import export_encoder
-from export.heads.head_shards import POINT_SCALE, HeadPictures, HeadPoints
+from export.heads.head_shards import POINT_SCALE, HeadImages, HeadPoints
 from export.heads.prior import PriorError
 from export.heads.prior_file import read_prior, write_prior
 from export.heads.train_prior import HeadTensors
@@ -38,8 +40,8 @@ float_nodes = ["/predict/*", "/points/*", "/first_place/*"]
 """
 
 
-def ball_pictures(views: int, seed: int) -> HeadPictures:
-    """Pictures of a ball, whose template points are where they are seen."""
+def ball_images(views: int, seed: int) -> HeadImages:
+    """Images of a ball, whose template points are where they are seen."""
     rng = np.random.default_rng(seed)
     y, x = (np.mgrid[:256, :256] - 127.5) / 80
     masks = np.where(x * x + y * y < 1, 255, 0).astype(np.uint8)
@@ -47,7 +49,7 @@ def ball_pictures(views: int, seed: int) -> HeadPictures:
     template = (np.dstack([x, 0 * x - 1, -y])[::2, ::2] * POINT_SCALE).clip(-32767, 32767).astype(np.int16)
     normal = np.where(masks[::2, ::2, None] > 0, np.array([0, 0, -127]), 0).astype(np.int8)
     stacked = [np.repeat(one[None], views, 0) for one in (rgb, masks, template, normal)]
-    return HeadPictures(*stacked, *(np.zeros((views, *size)) for size in ((3, 3), (3,), (3,))))
+    return HeadImages(*stacked, *(np.zeros((views, *size)) for size in ((3, 3), (3,), (3,))))
 
 
 def ball_points(seed: int) -> HeadPoints:
@@ -63,10 +65,10 @@ def ball_points(seed: int) -> HeadPoints:
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """A folder with pictures and points of two heads a split, and photographs."""
+    """A folder with images and points of two heads a split, and photographs."""
     folder = tmp_path_factory.mktemp("data")
     for k, split in enumerate(("train", "val")):
-        for kind, made in (("views", lambda seed: ball_pictures(6, seed)), ("points", ball_points)):
+        for kind, made in (("views", lambda seed: ball_images(6, seed)), ("points", ball_points)):
             (folder / kind / split).mkdir(parents=True)
             for number in range(2):
                 stored = vars(made(10 * k + number))
@@ -93,9 +95,17 @@ def command(monkeypatch, fp32: Path, data: Path, out: Path, *more: str) -> None:
     heads.main()
 
 
-def test_the_bundle_says_what_int8_costs(fp32, data, tmp_path, monkeypatch, capsys):
-    out = tmp_path / "heads-int8"
-    command(monkeypatch, fp32, data, out)
+@pytest.fixture(scope="module")
+def int8(fp32, data, tmp_path_factory):
+    out = tmp_path_factory.mktemp("int8") / "heads-int8"
+    with pytest.MonkeyPatch.context() as monkeypatch, contextlib.redirect_stdout(io.StringIO()) as said:
+        command(monkeypatch, fp32, data, out)
+    assert "bases, 2 heads, head: float16_mm" in said.getvalue()
+    return out
+
+
+def test_the_bundle_says_what_int8_costs(fp32, int8):
+    out = int8
     assert sorted(path.name for path in out.iterdir()) == ["encoder.onnx", "manifest.json", "prior.maqp"]
     manifest = read_manifest(out)
     assert (manifest["task"], manifest["precision"], manifest["name"]) == ("heads", "int8", "heads-int8")
@@ -121,26 +131,23 @@ def test_the_bundle_says_what_int8_costs(fp32, data, tmp_path, monkeypatch, caps
     assert "/predict/MatMul" in float_nodes_left(out / "encoder.onnx")
     assert (out / "prior.maqp").stat().st_size < (fp32 / "prior.maqp").stat().st_size
     read_prior(out / "prior.maqp")
-    assert "bases, 2 heads, head: float16_mm" in capsys.readouterr().out
 
 
-def test_a_new_encoder_takes_the_prior_of_a_bundle_over(fp32, data, tmp_path, monkeypatch, lively_encoder):
+def test_a_new_encoder_takes_the_prior_of_a_bundle_over(fp32, int8, data, tmp_path, monkeypatch, lively_encoder):
     """Also where the float bundle has the prior in int8, and the old bundle is the one that is written."""
-    out, other = tmp_path / "heads-int8", tmp_path / "other"
-    command(monkeypatch, fp32, data, out)
+    out, other = shutil.copytree(int8, tmp_path / "heads-int8"), tmp_path / "other"
     before, prior, encoder = read_manifest(out), (out / "prior.maqp").read_bytes(), (out / "encoder.onnx").read_bytes()
     shutil.copytree(fp32, other)
     shutil.copy(out / "prior.maqp", other)
     export_encoder(lively_encoder(1), other / "encoder.onnx")
     write_manifest(other, BundleInfo("heads-fp32", "fp32", training_data=({"name": "cubes"},)))
-    for target in (tmp_path / "new", out):
-        command(monkeypatch, other, data, target, "--keep", str(out))
-        manifest = read_manifest(target)
-        assert (target / "prior.maqp").read_bytes() == prior
-        assert (target / "encoder.onnx").read_bytes() != encoder
-        assert manifest["measured"]["bases_cost"] == before["measured"]["bases_cost"]
-        assert manifest["measured"]["int8_cost"] != before["measured"]["int8_cost"]
-        assert manifest["training_data"] == [{"name": "cubes"}]
+    command(monkeypatch, other, data, out, "--keep", str(out))
+    manifest = read_manifest(out)
+    assert (out / "prior.maqp").read_bytes() == prior
+    assert (out / "encoder.onnx").read_bytes() != encoder
+    assert manifest["measured"]["bases_cost"] == before["measured"]["bases_cost"]
+    assert manifest["measured"]["int8_cost"] != before["measured"]["int8_cost"]
+    assert manifest["training_data"] == [{"name": "cubes"}]
 
 
 def test_bases_that_are_int8_already_are_refused(fp32, data, tmp_path, monkeypatch):

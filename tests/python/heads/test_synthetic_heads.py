@@ -1,4 +1,4 @@
-"""Made heads: shapes that stay in their frame, closed surfaces with exact distances, pictures with the right labels."""
+"""Made heads: shapes that stay in their frame, closed surfaces with exact distances, images with the right labels."""
 
 import numpy as np
 import pytest
@@ -88,8 +88,8 @@ def test_hair_lies_outside_of_the_skin(maker):
     assert len(seen) >= 4
 
 
-def test_pictures_show_what_they_say(head):
-    """Template points of a frontal picture: the nose in the middle, left to the right, up above; depth from points."""
+def test_images_show_what_they_say(head):
+    """Template points of a frontal image: the nose in the middle, left to the right, up above; depth from points."""
     from export.heads.sampling import look_at, sample_lamps
     from export.heads.views import HeadViews
 
@@ -98,7 +98,7 @@ def test_pictures_show_what_they_say(head):
     y, x = np.nonzero(seen.mask)
     assert 0.05 < seen.mask.mean() < 0.6
     template = seen.template[y, x]
-    assert np.corrcoef(template[:, 0], x)[0, 1] > 0.9  # its left is on the picture's right
+    assert np.corrcoef(template[:, 0], x)[0, 1] > 0.9  # its left is on the image's right
     assert np.corrcoef(template[:, 2], y)[0, 1] < -0.9
     assert (seen.normal[y, x, 1] < 0.05).mean() > 0.95  # the face looks to -y
     points = camera.lifted(np.stack([x, y], 1), seen.depth[y, x])

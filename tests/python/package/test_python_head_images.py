@@ -66,7 +66,7 @@ def test_shadings_differ_and_backgrounds_are_behind(head, renderer):
     assert rgb.tobytes() not in seen
 
 
-def test_many_pictures_and_heads_are_freed(builder, renderer):
+def test_many_images_and_heads_are_freed(builder, renderer):
     camera = renderer.camera(0, 0, 64, 48)
     kept = [renderer.run(camera) for _ in range(10)]  # more than a pool holds
     assert all((image.alpha == kept[0].alpha).all() for image in kept)

@@ -71,7 +71,7 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
     assert not [name for name in names if "demo" in name or name.startswith("build")]
     # 17 MB until edges had a network of twice the size (0.4 MB) and the library prediction (0.07 MB); then the bundle
     # of prediction came (2.4 MB, of which its table packs well), its transformer (3 MB) and larger networks of edges
-    # and heads (0.7 MB); 23.5 MB until the network that mends pictures came (1.4 MB).
+    # and heads (0.7 MB); 23.5 MB until the refiner came (1.4 MB).
     assert wheel.stat().st_size < 24.5e6
 
 

@@ -1,4 +1,4 @@
-"""Animals are read from the game's meshes, stand on the ground and are background in every picture."""
+"""Animals are read from the game's meshes, stand on the ground and are background in every image."""
 
 import struct
 

@@ -28,7 +28,7 @@ def at_every_node(grid, part, count=200):
     return points[reached], uv[reached]
 
 
-def test_the_shipped_picture_is_what_the_command_draws(grid, shipped):
+def test_the_shipped_image_is_what_the_command_draws(grid, shipped):
     drawn = outfit.drawn(grid)
     assert shipped.shape == drawn.shape == (768, 512, 3)
     # Processors round differently, and a tone then falls on the next step.

@@ -1,4 +1,4 @@
-"""Rendered pictures carry the labels of what is seen."""
+"""Rendered images carry the labels of what is seen."""
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ def test_a_second_renderer_does_not_disturb_the_first(renderer, model, atlas):
 
 
 @needs_body
-def test_drawing_twice_gives_the_same_picture(renderer, model):
+def test_drawing_twice_gives_the_same_image(renderer, model):
     first, second = (picture(renderer, model, shifts=(0.0, 0.3)) for _ in range(2))
     assert np.array_equal(first.label, second.label)
     assert np.array_equal(first.rgb, second.rgb)

@@ -256,7 +256,7 @@ def test_a_rolled_camera_turns_labels_and_background_clockwise(studio, monkeypat
         monkeypatch.setattr(studio.director, "variety", quarter)
         stage = studio.director.stage(np.random.default_rng(seed))
         up = stage.camera.rotation @ [0, 0, 1.0]
-        before = upright.rotation @ [0, 0, 1.0]  # points to -y of the picture, which is up
+        before = upright.rotation @ [0, 0, 1.0]  # points to -y of the image, which is up
         sign = np.sign(stage.roll_degrees)
         assert up[0] == pytest.approx(-sign * before[1], abs=1e-9)
         behind = studio._background_behind(np.random.default_rng(seed), stage.roll_degrees)

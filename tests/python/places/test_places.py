@@ -89,7 +89,7 @@ def test_what_one_view_sees_the_next_ones_see_at_the_same_depth(folders, kind):
     assert agree / seen > 0.97
 
 
-def test_points_have_the_colour_that_other_pictures_show(folders):
+def test_points_have_the_colour_that_other_images_show(folders):
     place = load_place(folders / "room")
     view = int(place.held_out[0])
     image, depth = place.images[view], place.depth[view]
@@ -176,7 +176,7 @@ def test_depth_is_that_of_the_centre_of_each_pixel():
     assert np.abs(depth / expected - 1).max() < 5e-6
 
 
-def test_pictures_lie_over_their_depth():
+def test_images_lie_over_their_depth():
     # A white wall from x = 0.1 to the right: its edge is seen in a column that a camera tells exactly.
     camera = looking(Lens(101, 40, 60.0, (3.3, 0.0)), np.array([0, -2.0, 0]), np.zeros(3))
     wall = _quad([(0.1, 0, -5), (9, 0, -5), (9, 0, 5), (0.1, 0, 5)], (1, 1, 1), emission=50.0)
@@ -191,7 +191,7 @@ _WALL = [(-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9)]
 
 
 def _seen(part, *eyes):
-    """Pictures of a part by cameras at `eyes` that look at the origin."""
+    """Images of a part by cameras at `eyes` that look at the origin."""
     with Renderer([part], _lighting()) as renderer:
         cameras = [looking(Lens(64, 64, 50.0), np.array(eye, float), np.zeros(3)) for eye in eyes]
         return [renderer.colour(c, 0.5).astype(int) for c in cameras]
@@ -351,7 +351,7 @@ def test_missing_and_damaged_files_are_told_in_a_sentence(room, tmp_path):
         load_place(room)
 
 
-def test_pictures_are_read_one_by_one_or_several_at_once(folders):
+def test_images_are_read_one_by_one_or_several_at_once(folders):
     place = load_place(folders / "room")
     height, width = place.images.height, place.images.width
     assert place.images[0].shape == (height, width, 3)

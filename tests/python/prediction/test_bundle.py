@@ -30,7 +30,7 @@ def bundle(tmp_path):
     return tmp_path, net, table, differences
 
 
-def test_graphs_give_the_codes_and_pictures_of_torch(bundle):
+def test_graphs_give_the_codes_and_images_of_torch(bundle):
     folder, net, _, differences = bundle
     assert max(differences.values()) < 1e-4
     frames = torch.randint(0, 256, (4, 64, 64, 3), dtype=torch.uint8)

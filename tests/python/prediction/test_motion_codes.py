@@ -53,7 +53,7 @@ def coded(clips):
     return coded_clips(Autoencoder(SMALL).eval(), clips, mirrored=True, workers=Workers(processes=0))
 
 
-def test_motion_foresees_a_square_that_moves():
+def test_motion_predicts_a_square_that_moves():
     film = square_that_moves()
     pictures = motion_pictures(MotionJob(0, film, 15.0)).astype(float)
     for h, horizon in enumerate(HORIZONS[:3]):
@@ -86,7 +86,7 @@ def test_codes_are_read_as_they_were_written(coded, tmp_path):
     assert torch.equal(again.motion, coded.motion)
 
 
-def test_an_example_has_the_picture_that_motion_predicted_for_its_frame(coded):
+def test_an_example_has_the_image_that_motion_predicted_for_its_frame(coded):
     one = examples(coded, torch.tensor([0, 3]), torch.tensor([9, 1]), SHAPE)
     assert one.before.shape[1] == SHAPE.seen == 4
     assert torch.equal(one.before[0, 3], coded.motion[0, 8, 0].long())

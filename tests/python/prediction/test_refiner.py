@@ -53,7 +53,7 @@ def test_a_new_convolutional_network_repeats_the_last_frame_and_then_learns():
     assert ConvolutionalNet(shape).predicted(clips.frames[:1, :3], torch.zeros(1, 2)).shape == (1, 64, 64, 3)
 
 
-def test_a_mender_begins_with_half_of_what_is_foreseen_and_learns_where_it_is_wrong():
+def test_a_refiner_begins_with_half_of_the_prediction_and_learns_where_it_is_wrong():
     clips = moving_square()
     pictures = torch.full((2, 16, len(train_convolutional.HORIZONS), 64, 64, 3), 140, dtype=torch.uint8)
     torch.manual_seed(0)
@@ -69,14 +69,14 @@ def test_a_mender_begins_with_half_of_what_is_foreseen_and_learns_where_it_is_wr
 
 @BUILT
 @pytest.mark.parametrize("large", [True, False])
-def test_what_is_foreseen_of_a_clip_is_of_its_large_frames_if_it_has_some(tmp_path, large):
+def test_predictions_of_a_clip_are_of_its_large_frames_if_it_has_some(tmp_path, large):
     clip = shapes_clip("train", 0, large)
     source, path = tmp_path / "clips/shapes/train/clip-00000.npz", tmp_path / "out/shapes/train/clip-00000.npz"
     for folder in (source.parent, path.parent):
         folder.mkdir(parents=True)
     write_clip(clip, source)
-    auto_predictions.write_foreseen((source, path))
-    known = auto_predictions.read_foreseen([tmp_path / "out"], ["shapes"], "train")
+    auto_predictions.write_predictions((source, path))
+    known = auto_predictions.read_predictions([tmp_path / "out"], ["shapes"], "train")
     frames, pictures = known.clips.frames[0].numpy(), known.pictures[0].numpy()
     assert known.clips.names == ["shapes/clip-00000"]
     assert known.clips.fps.tolist() == [clip.fps]
@@ -92,16 +92,16 @@ def test_what_is_foreseen_of_a_clip_is_of_its_large_frames_if_it_has_some(tmp_pa
             assert pictures[t, h].any() == is_known(t, horizon, 30)
 
 
-def test_a_training_of_what_is_foreseen_is_a_command_that_goes_on_from_weights(tmp_path, monkeypatch):
+def test_a_training_on_predictions_is_a_command_that_goes_on_from_weights(tmp_path, monkeypatch):
     clips = moving_square()
     for split in ("train", "val"):
-        folder = tmp_path / "foreseen/shapes" / split
+        folder = tmp_path / "auto/shapes" / split
         folder.mkdir(parents=True)
         pictures = np.full((16, len(HORIZONS), 64, 64, 3), 140, np.uint8)
-        np.savez(folder / "clip-00000.npz", frames=clips.frames[0].numpy(), foreseen=pictures, fps=10.0)
+        np.savez(folder / "clip-00000.npz", frames=clips.frames[0].numpy(), predictions=pictures, fps=10.0)
 
     def trained(out, *more):
-        words = ["train", "--foreseen", str(tmp_path / "foreseen"), "--sets", "shapes", "--out", str(tmp_path / out),
+        words = ["train", "--predictions", str(tmp_path / "auto"), "--sets", "shapes", "--out", str(tmp_path / out),
                  "--steps", "2", "--batch", "2", "--validate-frames", "2", "--device", "cpu", *more]  # fmt: skip
         monkeypatch.setattr("sys.argv", words)
         train_convolutional.main()
@@ -116,21 +116,21 @@ def test_a_training_of_what_is_foreseen_is_a_command_that_goes_on_from_weights(t
 
 def test_missing_predictions_are_named(tmp_path):
     with pytest.raises(SystemExit, match=r"auto_predictions --split val --sets shapes"):
-        auto_predictions.read_foreseen([tmp_path], ["shapes"], "val")
+        auto_predictions.read_predictions([tmp_path], ["shapes"], "val")
 
 
-def test_a_mender_that_begins_with_another_network_has_half_of_its_picture():
+def test_a_refiner_that_begins_with_another_network_has_half_of_its_image():
     clips = moving_square()
     torch.manual_seed(0)
     alone = ConvolutionalNet(ConvolutionalShape(widths=(8, 16, 32), blocks=2))
     for parameter in alone.out[-1].parameters():
         torch.nn.init.normal_(parameter, std=0.1)
-    mender = ConvolutionalNet(ConvolutionalShape(widths=(8, 16, 32), blocks=2, motion=True))
-    mender.begin_with(alone)
-    foreseen_picture = torch.full((1, 1, 64, 64, 3), 140, dtype=torch.uint8)
+    refiner = ConvolutionalNet(ConvolutionalShape(widths=(8, 16, 32), blocks=2, motion=True))
+    refiner.begin_with(alone)
+    predicted_image = torch.full((1, 1, 64, 64, 3), 140, dtype=torch.uint8)
     frames, times = clips.frames[:1, 3:6], torch.tensor([[0.3, 0.4]])
     with torch.no_grad():
         own = alone.predicted(frames, times)
-        mixed = mender.predicted(torch.cat([frames, foreseen_picture], 1), times)
+        mixed = refiner.predicted(torch.cat([frames, predicted_image], 1), times)
     assert (own - frames[:, -1]).abs().max() > 5
     torch.testing.assert_close(mixed, 0.5 * (own + 140), atol=0.01, rtol=1e-5)

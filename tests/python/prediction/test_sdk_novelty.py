@@ -50,7 +50,7 @@ def test_cells_of_test_clips_have_the_bits_of_torch(clips, tmp_path):
     assert equal >= 0.999 * cells, f"{cells - equal} of {cells} cells differ"
 
 
-def test_what_was_seen_is_the_picture_that_torch_makes_of_the_codes(clips, tmp_path):
+def test_what_was_seen_is_the_image_that_torch_makes_of_the_codes(clips, tmp_path):
     net = load_autoencoder(WEIGHTS)
     codes = net.encode(torch.from_numpy(clips[0]))
     export_bundle(net, CodeTable.counted(codes[None], net.shape.entries), tmp_path, BundleInfo("whole", "fp32"))

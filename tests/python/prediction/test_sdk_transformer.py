@@ -1,4 +1,4 @@
-"""Bits of frames by the transformer through the C API are those of torch, with the picture that motion foresees."""
+"""Bits of frames by the transformer through the C API are those of torch, with the image that motion predicts."""
 
 import math
 from pathlib import Path
@@ -58,16 +58,16 @@ def made(tmp_path_factory):
 
 @torch.no_grad()
 def stream_bits(net: LatentTransformer, stored: FrameCodes, codes: torch.Tensor, motion: torch.Tensor) -> np.ndarray:
-    """[T - 1, 16, 16]. motion [T, slices, 16, 16]: what motion foresees of each frame, UNSEEN where nothing."""
-    foreseen = []
+    """[T - 1, 16, 16]. motion [T, slices, 16, 16]: what motion predicts of each frame, UNSEEN where nothing."""
+    predictions = []
     for t in range(1, len(codes)):
         seen = codes[max(0, t - 3) : t]
         unseen = torch.full((3 - len(seen), *codes.shape[1:]), UNSEEN)
         before = torch.cat([unseen, seen, motion[t : t + 1]])[None]
         logits = net(before, codes[t : t + 1], torch.tensor([FPS]))[0]
         likely = logits.double().log_softmax(-1).gather(-1, codes[t].flatten(1)[..., None])[..., 0]
-        foreseen.append(-likely.view(codes.shape[1:]).numpy() / math.log(2))
-    return bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy(), np.stack(foreseen)).mean(1)
+        predictions.append(-likely.view(codes.shape[1:]).numpy() / math.log(2))
+    return bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy(), np.stack(predictions)).mean(1)
 
 
 def bits_of(novelty: maquette.Novelty, frames: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def bits_of(novelty: maquette.Novelty, frames: np.ndarray) -> np.ndarray:
     return np.stack([novelty.push(np.ascontiguousarray(f), time_s=t / FPS).map for t, f in enumerate(frames)])[1:]
 
 
-def test_cells_have_the_bits_of_torch_with_what_motion_foresees(made):
+def test_cells_have_the_bits_of_torch_with_the_prediction_of_motion(made):
     folder, autoencoder, net, stored, frames, codes = made
     pictures = motion_pictures(MotionJob(0, frames, FPS))[:, 0]
     motion = torch.full_like(codes, UNSEEN)
@@ -87,7 +87,7 @@ def test_cells_have_the_bits_of_torch_with_what_motion_foresees(made):
     # Every cell depends on all codes of three frames; one in a thousand of these may differ by a near tie.
     assert np.median(np.abs(found - expected)) < 1e-3
     assert np.mean(np.abs(found - expected) < 0.02) >= 0.99
-    assert np.median(np.abs(found - without)[2:]) > 0.01, "what motion foresees is seen"
+    assert np.median(np.abs(found - without)[2:]) > 0.01, "what motion predicts is seen"
     assert novelty.stats["transformer_ms"] > 0
 
 

@@ -117,7 +117,7 @@ def test_a_clean_file_is_known_in_another_checkout(project, tmp_path_factory):
     assert project("a.cpp") == (0, "", ["a.cpp"])
 
 
-def test_what_it_says_fails_the_run_until_it_is_mended(project):
+def test_what_it_says_fails_the_run_until_it_is_repaired(project):
     (project.folder / "b.cpp").write_text("int b();  // BAD\n")
     for _ in range(2):
         status, said, checked = project("b.cpp")

@@ -131,7 +131,7 @@ def test_results_of_different_lengths_are_an_error():
         compare([prediction([1])], [])
 
 
-def test_pictures_are_read_from_files_and_missing_ones_explained():
+def test_images_are_read_from_files_and_missing_ones_explained():
     assert load_images(Path("tests/media/photo.jpg"))[0].shape == (512, 512, 3)
     assert len(load_images(Path("tests/media/clip.mp4"), 3)) == 3
     with pytest.raises(FileNotFoundError, match="nowhere"):

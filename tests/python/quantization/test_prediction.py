@@ -1,4 +1,4 @@
-"""An int8 bundle of prediction has the codes and pictures of the fp32 one, nearly."""
+"""An int8 bundle of prediction has the codes and images of the fp32 one, nearly."""
 
 import json
 import shutil
@@ -63,7 +63,7 @@ def assert_samples_do_not_depend_on_each_other(int8: Path) -> None:
     np.testing.assert_array_equal(one, head.run(None, {"features": features, "earlier": earlier})[0][:1])
 
 
-def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
+def test_int8_keeps_codes_images_and_bits(tmp_path, monkeypatch):
     for split in ("train", "val"):
         folder = tmp_path / "clips/shapes" / split
         folder.mkdir(parents=True)
@@ -124,23 +124,23 @@ def test_int8_keeps_codes_pictures_and_bits(tmp_path, monkeypatch):
         prediction.main()
 
 
-def test_the_network_that_mends_is_put_into_a_bundle_whose_rest_stays(tmp_path):
+def test_the_refiner_is_put_into_a_bundle_whose_rest_stays(tmp_path):
     bundle = tmp_path / "bundle"
     shutil.copytree(TINY, bundle)
     before = {path.name: path.read_bytes() for path in bundle.iterdir()}
     rng = np.random.default_rng(0)
     for split in ("train", "val"):
-        folder = tmp_path / "foreseen/shapes" / split
+        folder = tmp_path / "auto/shapes" / split
         folder.mkdir(parents=True)
         frames = np.repeat(rng.integers(0, 255, (1, 64, 64, 3), np.uint8), 16, 0)
-        foreseen = np.repeat(frames[:, None] // 2, 5, 1)
-        np.savez(folder / "clip-00000.npz", frames=frames, foreseen=foreseen, fps=10.0)
+        predictions = np.repeat(frames[:, None] // 2, 5, 1)
+        np.savez(folder / "clip-00000.npz", frames=frames, predictions=predictions, fps=10.0)
     torch.manual_seed(0)
     shape = ConvolutionalShape(widths=(4, 8, 8), blocks=1, kernel=3, motion=True)
     weights = tmp_path / "weights.pt"
     torch.save({"shape": asdict(shape), "net": ConvolutionalNet(shape).state_dict()}, weights)
     settings = replace(read_settings(PREDICTION, PredictionSettings), frames=5, held_out_frames=5)
-    manifest = prediction_refiner.put_mended(weights, bundle, tmp_path / "foreseen", ["shapes"], settings)
+    manifest = prediction_refiner.put_refined(weights, bundle, tmp_path / "auto", ["shapes"], settings)
     after = {path.name: path.read_bytes() for path in bundle.iterdir()}
     assert {name for name in after if after[name] != before[name]} == {"mended.onnx", "manifest.json"}
     assert manifest["mended"] == {"before": 3, "max_ahead": 12, "fps": [10, 30]}

@@ -135,12 +135,12 @@ def test_signal_to_noise_in_decibels():
     assert sqnr_db(1.0, 0.0) == float("inf")
 
 
-def test_calibration_pictures_are_spread_over_the_shards():
+def test_calibration_images_are_spread_over_the_shards():
     assert spread(list(range(100)), 5) == [0, 20, 40, 60, 80]
     assert spread([1, 2], 5) == [1, 2]
 
 
-def test_pictures_of_both_orientations_calibrate_together(folder, tmp_path):
+def test_images_of_both_orientations_calibrate_together(folder, tmp_path):
     rng = np.random.default_rng(0)
     samples = [{"image": rng.standard_normal(s).astype(np.float32)} for s in ((1, 3, 64, 96), (1, 3, 96, 64))]
     padded = [sample["image"] for sample in equal_sizes(samples)]

@@ -130,7 +130,7 @@ def break_scale(path, tensor, factor=4.0, channel=None):
 
 @pytest.fixture(scope="module")
 def rebuilt(tmp_path_factory):
-    """Prepared fp32 graphs from the weights of this repository, and what they see on its pictures."""
+    """Prepared fp32 graphs from the weights of this repository, and what they see on its images."""
     folder = tmp_path_factory.mktemp("fp32")
     source = check.fp32_bundle(check.WEIGHTS, folder / "bundle")
     return check.prepared_graphs(source.folder, folder / "prepared"), check.media_samples(source)

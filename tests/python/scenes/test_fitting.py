@@ -73,7 +73,7 @@ def test_the_aligned_frame_holds_the_whole_photo_and_little_more(roll):
         assert (turned.width_px, turned.height_px) == (112, 64)
 
 
-def test_turned_pictures_show_what_the_turned_camera_sees():
+def test_turned_images_show_what_the_turned_camera_sees():
     scene, camera = BoxScene(0), looking((1.5, 0.4, 2), (0, -0.5, 0), 200, 140, roll=0.5)
     turned = upright(camera, np.array([0, 1.0, 0]), 32)
     expected, _ = scene.photo(turned, 3)
@@ -293,7 +293,7 @@ def room():
     return torch.from_numpy(places), torch.from_numpy(colours).float(), views
 
 
-def test_a_model_for_one_picture_is_as_good_as_the_whole_one(room):
+def test_a_model_for_one_image_is_as_good_as_the_whole_one(room):
     points, _, views = room
     networks, options = Networks(SIZES["tiny"]).eval(), Options()
     camera = upright(views[1].camera, np.array([0, 1.0, 0]), 16)
@@ -323,8 +323,8 @@ def test_features_are_those_of_the_pixel_a_point_is_in(room):
 
 
 @pytest.mark.parametrize("roll", [0.0, 0.7])
-def test_a_picture_of_any_size_and_turn_is_what_the_camera_sees(room, roll):
-    """With networks that pass colours through, a rendered picture is the painted cloud, turned and back."""
+def test_an_image_of_any_size_and_turn_is_what_the_camera_sees(room, roll):
+    """With networks that pass colours through, a rendered image is the painted cloud, turned and back."""
     points, colours, views = room
     networks, options = Networks(SIZES["tiny"]).eval(), Options()
     camera = looking((0.2, 0.3, 2.4), (0, -0.5, 0), 61, 45, roll)

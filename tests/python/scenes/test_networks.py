@@ -45,7 +45,7 @@ def test_extractor_and_light_refiner_fit_into_the_bundle():
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_a_system_of_every_size_makes_features_and_a_picture(name):
+def test_a_system_of_every_size_makes_features_and_an_image(name):
     networks = Networks(SIZES[name]).eval()
     with torch.no_grad():
         assert networks.extractor(torch.rand(1, 3, 64, 96)).shape == (1, 8, 64, 96)
@@ -119,7 +119,7 @@ def test_a_refiners_graph_is_the_network_at_any_size(tmp_path, config):
         assert parity(RefinerGraph(net), path, given) <= 1e-5
 
 
-def test_the_graph_of_a_folded_refiner_takes_and_gives_folded_pictures():
+def test_the_graph_of_a_folded_refiner_takes_and_gives_folded_images():
     net = LightRefiner(LIGHT).eval()
     given = rasters(32, 48, LIGHT.levels)
     first = space_to_depth(given[0]).permute(0, 2, 3, 1)
@@ -156,7 +156,7 @@ def test_another_file_is_not_taken_for_weights(tmp_path):
         load_networks(tmp_path / "weights.pt")
 
 
-def test_features_of_another_scale_make_the_same_picture():
+def test_features_of_another_scale_make_the_same_image():
     networks = Networks(SceneConfig(SIZES["tiny"].extractor, LIGHT)).eval()
     torch.nn.init.normal_(networks.refiner.final.weight)
     photo = torch.rand(1, 3, 64, 96)

@@ -27,7 +27,7 @@ def test_ssim_is_that_of_scikit_image():
     assert ssim(*pictures()) == pytest.approx(0.62405579972681, abs=1e-9)
 
 
-def test_ssim_of_flat_pictures_is_that_of_their_brightness():
+def test_ssim_of_flat_images_is_that_of_their_brightness():
     a, b = np.full((16, 16, 3), 0.25), np.full((16, 16, 3), 0.75)
     assert ssim(a, b) == pytest.approx((2 * 0.25 * 0.75 + C1) / (0.25**2 + 0.75**2 + C1))
 

@@ -14,7 +14,7 @@ from export.densepose.network import MobileNetV2
 from export.scenes import train
 from export.scenes.captures import read_captures
 from export.scenes.config import SIZES
-from export.scenes.losses import LossWeights, own_rasters, picture_terms
+from export.scenes.losses import LossWeights, image_terms, own_rasters
 from export.scenes.networks.system import Networks, load_networks
 from export.scenes.perceptual import Perceptual
 from export.scenes.samples import Sampling, draw_sample
@@ -124,12 +124,12 @@ def test_pixels_outside_of_the_photo_do_not_count():
     mask[..., 16:] = 0
     picture[..., :16] = target[..., :16]
     perceptual = Perceptual(MobileNetV2())
-    terms = picture_terms(picture, target, mask, LossWeights(), perceptual)
+    terms = image_terms(picture, target, mask, LossWeights(), perceptual)
     assert all(value == 0 for value in terms.values())
-    assert all(value > 0 for value in picture_terms(picture, target, mask.flip(3), LossWeights(), perceptual).values())
+    assert all(value > 0 for value in image_terms(picture, target, mask.flip(3), LossWeights(), perceptual).values())
 
 
-def test_the_perceptual_distance_has_a_gradient_for_the_picture_alone():
+def test_the_perceptual_distance_has_a_gradient_for_the_image_alone():
     perceptual = Perceptual(MobileNetV2()).train()
     picture = torch.rand(1, 3, 64, 64, requires_grad=True)
     perceptual(picture, torch.rand(1, 3, 64, 64), torch.ones(1, 1, 64, 64)).backward()
@@ -138,7 +138,7 @@ def test_the_perceptual_distance_has_a_gradient_for_the_picture_alone():
     assert not perceptual.trunk.training
 
 
-def test_a_pictures_own_rasters_lose_most_where_they_are_finest():
+def test_an_images_own_rasters_lose_most_where_they_are_finest():
     rasters = own_rasters(torch.ones(1, 8, 512, 512))
     shares = [float(raster[:, 8].mean()) for raster in rasters]
     assert shares == pytest.approx([0.5, 0.75, 0.875, 0.9375, 0.96875], abs=0.02)

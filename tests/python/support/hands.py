@@ -102,7 +102,7 @@ class Hands:
         return np.frombuffer(seen.data, np.uint8).reshape(shape.height, shape.width, 4)[..., :3]
 
     def looks_like(self, picture: np.ndarray, error: float = 12) -> bool:
-        """Whether the left part, where pictures are, has this one in it, scaled to fit; by the mean difference."""
+        """Whether the left part, where images are, has this one in it, scaled to fit; by the mean difference."""
         area = self.see()[:, :-330]
         scale = min(area.shape[1] / picture.shape[1], area.shape[0] / picture.shape[0])
         wanted = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)

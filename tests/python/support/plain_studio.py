@@ -14,7 +14,7 @@ WIDTH, HEIGHT = 160, 256  # of the renderer in conftest.py
 
 @contextmanager
 def plain_studio(folder: Path) -> Iterator:
-    """folder: for its few pictures."""
+    """folder: for its few images."""
     from export.people import scene
     from export.people.motion import Clips, drawn_pose
     from export.people.wardrobe import Fabrics

@@ -60,7 +60,7 @@ class Shown:
         return self.screenshot[y : y + height, x : x + width]
 
     def at_frame_pixels(self, width: int, height: int) -> np.ndarray:
-        """The shown picture at the middles of the pixels of a frame of that size: uint8 [height, width, 3]."""
+        """The shown image at the middles of the pixels of a frame of that size: uint8 [height, width, 3]."""
         left, top, wide, tall = self.report["picture_px"]
         x = left + (np.arange(width, dtype=np.float32) + 0.5) * wide / width - 0.5
         y = top + (np.arange(height, dtype=np.float32) + 0.5) * tall / height - 0.5

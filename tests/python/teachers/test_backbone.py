@@ -1,4 +1,4 @@
-"""The detector's backbone becomes ours: the same layers, and the same numbers for the same picture."""
+"""The detector's backbone becomes ours: the same layers, and the same numbers for the same image."""
 
 from types import SimpleNamespace
 

@@ -31,7 +31,7 @@ def picture():
     return image, label
 
 
-def test_the_mirrored_picture_gets_the_mirrored_answer(consensus, picture):
+def test_the_mirrored_image_gets_the_mirrored_answer(consensus, picture):
     image, label = picture
     mask = label[..., 3] == 1
     answer, _ = consensus.ask(image, mask)

@@ -70,7 +70,7 @@ def test_an_opened_pack_gives_assets_and_shards_of_photographs(tmp_path, data):
         assert sum(np.array_equal(label, found) for found in labels) == 4
 
 
-def test_pictures_are_made_smaller_and_never_larger():
+def test_images_are_made_smaller_and_never_larger():
     assert pack_file.shrunk(np.zeros((600, 1024, 3), np.uint8)).shape == (300, 512, 3)
     assert pack_file.shrunk(np.zeros((30, 40, 3), np.uint8)).shape == (30, 40, 3)
 

@@ -1,11 +1,11 @@
 """Draws the outfit that the desktop demo's try-on view puts on people: a striped jersey, jeans, shoes and a hat.
 
-    python -m export.people.outfit [--out outfit.png] [--image worn.png]
+    python -m export.people.outfit [--out outfit.png]
 
 The image is a DensePose texture atlas: 4 columns of 6 square tiles, part p in column (p - 1) // 6 and row
 (p - 1) % 6; in a tile U grows to the right and V upwards (as DensePose's notebook of texture transfer reads them).
 The colour of a place is a function of its point on the template body, so what is drawn goes on across chart borders.
-`--image` shows the template body wearing it. Ours alone: it may be used like the code.
+Ours alone: it may be used like the code.
 """
 
 from __future__ import annotations
@@ -237,39 +237,15 @@ def drawn(grid: SurfaceGrid) -> np.ndarray:
     return texture
 
 
-def worn(grid: SurfaceGrid, texture: np.ndarray, height_px: int) -> np.ndarray:
-    """The template body from the front and from behind, wearing a texture: uint8 [H, W, 3] BGR."""
-    u, v = np.meshgrid(*[np.linspace(0, 1, max(200, height_px // 2))] * 2)
-    uv = np.stack([u.ravel(), v.ravel()], 1)
-    part = np.repeat(np.arange(1, surface.PART_COUNT + 1), len(uv))
-    uv = np.tile(uv, (surface.PART_COUNT, 1))
-    points = grid.point_of(part, uv)
-    reached = ~np.isnan(points).any(1)
-    points, pixels = points[reached], looked_up(texture, part[reached], uv[reached])
-    scale = (height_px - 1) / np.ptp(points[:, 2])
-    row = np.round((points[:, 2].max() - points[:, 2]) * scale).astype(int)
-    sides = []
-    for facing in (1, -1):
-        column = np.round((facing * points[:, 0] - points[:, 0].min()) * scale).astype(int)
-        order = np.argsort(-facing * points[:, 1], kind="stable")
-        side = np.full((height_px, column.max() + 1, 3), 128, np.uint8)
-        side[row[order], column[order]] = pixels[order]
-        sides.append(side)
-    return np.hstack(sides)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=OUTFIT)
-    parser.add_argument("--picture", type=Path, help="also the template body wearing it")
     options = parser.parse_args()
     grid = SurfaceGrid.load(GRID)
     texture = drawn(grid)
     if not cv2.imwrite(str(options.out), texture, [cv2.IMWRITE_PNG_COMPRESSION, 9]):
         parser.exit(1, f"{options.out} could not be written.\n")
     print(f"Written: {options.out} ({options.out.stat().st_size} bytes)")
-    if options.picture and not cv2.imwrite(str(options.picture), worn(grid, texture, 700)):
-        parser.exit(1, f"{options.picture} could not be written.\n")
 
 
 if __name__ == "__main__":

@@ -9,9 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from shown_by_demo import DEMO, MAQUETTE, ROOT, headless, psnr_db, run, show
+from shown_by_demo import DEMO, MAQUETTE, ROOT, headless, psnr_db, room_of_few_photos, run, show
 
-ROOM = ROOT / "tests/media/room"
 WITH_SANITIZERS = ROOT / "build/asan/stage/bin/maquette-demo"
 
 pytestmark = [
@@ -24,24 +23,29 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def scene_file(tmp_path_factory):
+def room(tmp_path_factory):
+    return room_of_few_photos(tmp_path_factory.mktemp("photos"))
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory, room):
     path = tmp_path_factory.mktemp("scene") / "room.maqs"
-    ran = run(MAQUETTE, "scene", "build", ROOM, "--out", path)
+    ran = run(MAQUETTE, "scene", "build", room, "--out", path)
     assert ran.returncode == 0, ran.stderr
     return path
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory, scene_file):
+def scenes(tmp_path_factory, room, scene_file):
     """The room with each way to compare, once made of its photos by the demo; ends where one of them was taken."""
     folder = tmp_path_factory.mktemp("room")
-    files = {"none": [ROOM], "slider": [scene_file, "--capture", ROOM], "error": [scene_file, "--capture", ROOM]}
+    files = {"none": [room], "slider": [scene_file, "--capture", room], "error": [scene_file, "--capture", room]}
     return {way: show(folder, *paths, "--compare", way, "--frames", 3) for way, paths in files.items()}
 
 
 def photo_of(shown) -> np.ndarray:
     """As large as the image of the demo."""
-    photo = ROOM / shown.report["scene"]["photo"].removesuffix(" (held out)")
+    photo = ROOT / "tests/media/room" / shown.report["scene"]["photo"].removesuffix(" (held out)")
     return cv2.resize(cv2.imread(str(photo)), shown.report["picture_px"][2:], interpolation=cv2.INTER_LINEAR)
 
 
@@ -90,12 +94,12 @@ def test_a_scene_file_is_shown_without_its_photos(scene_file, tmp_path):
 def lost_camera(tmp_path_factory):
     """A long run, with a camera that is lost and comes back."""
     folder = tmp_path_factory.mktemp("lost_camera")
-    return show(folder, "--source", "stub:people?count=2&seed=7&unplug=1s@2s", "--frames", 100)
+    return show(folder, "--source", "stub:people?count=2&seed=7&unplug=1s@2s", "--frames", 75)
 
 
 def test_a_camera_that_is_lost_and_comes_back_goes_on(lost_camera):
     shown = lost_camera
-    assert shown.report["frames"] == 100
+    assert shown.report["frames"] == 75
     assert shown.report["problem"] == ""
     states = shown.report["states"]
     assert "running" in states[states.index("reconnecting") :]

@@ -17,7 +17,7 @@ pytestmark = [
 ]
 
 # The walkers of the first are three in their 16th frame, one of them at the image's edge.
-SOURCES = {"walkers": ("stub:people?count=3&seed=3", 16), "clip": (f"video:{ROOT}/tests/media/clip.mp4", 30)}
+SOURCES = {"walkers": ("stub:people?count=3&seed=3", 16), "clip": (f"video:{ROOT}/tests/media/clip.mp4", 8)}
 
 
 @pytest.fixture(scope="module", params=SOURCES)

@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 import pytest
 from hands import demo
-from shown_by_demo import DEMO, MAQUETTE, ROOT, run
+from shown_by_demo import DEMO, MAQUETTE, ROOT, room_of_few_photos, run
 
 pytestmark = pytest.mark.skipif(
     not DEMO.exists(), reason="maquette-demo is not built (scripts/install-packages.sh desktop)"
 )
 
-PHOTO, CLIP, ROOM = (ROOT / "tests/media" / name for name in ("photo.jpg", "clip.mp4", "room"))
+PHOTO, CLIP = (ROOT / "tests/media" / name for name in ("photo.jpg", "clip.mp4"))
 
 
 def one_of(folder, pattern):
@@ -41,7 +41,8 @@ def test_views_by_key_and_files_by_drop(tmp_path):
             "the green picture, worn",
         )
         hands.press("1")
-        hands.drop(ROOM)
+        (tmp_path / "room").mkdir()
+        hands.drop(room_of_few_photos(tmp_path / "room"))
         hands.until(lambda: hands.see()[:, :950].std() > 30 and not hands.looks_like(photo, 40), "the room", 60)
         hands.press("x")
         hands.until(lambda: hands.looks_like(photo), "the photo, back from the scene")

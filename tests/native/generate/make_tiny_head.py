@@ -90,7 +90,7 @@ def field_at(prior: Prior, points: np.ndarray) -> list[np.ndarray]:
 
 
 def usual_prior() -> Prior:
-    """Returns a field of the usual size with values like a head's: wide layers of random numbers would multiply them."""
+    """Returns a field of the usual size with values like a head: wide layers of random numbers would grow them."""
 
     def scaled(layers: list[Layer], by: float) -> list[Layer]:
         return [Layer(by * layer.weights, by * layer.bias) for layer in layers]

@@ -100,30 +100,6 @@ def openvino_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[s
     return openvino.__version__.split("-")[0], runs
 
 
-def litert_runs(folder: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
-    """Returns LiteRT with the kernels of XNNPACK; its graphs are TensorFlow Lite files with signed activations."""
-    from importlib.metadata import version
-
-    from ai_edge_litert.interpreter import Interpreter
-
-    from benchmarks import tflite
-
-    runs = {}
-    for name, feed in feeds.items():
-        model = tflite.from_onnx(folder / f"{name}.onnx", feed)
-        interpreter = Interpreter(model_content=model, num_threads=threads)
-        interpreter.allocate_tensors()
-        for place, value in zip(interpreter.get_input_details(), tflite.channels_last(feed), strict=True):
-            interpreter.set_tensor(place["index"], value)
-        outputs = [place["index"] for place in interpreter.get_output_details()]
-
-        def read(interpreter: object = interpreter, outputs: list = outputs) -> list[np.ndarray]:
-            return [interpreter.get_tensor(index) for index in outputs]
-
-        runs[name] = Runner(interpreter.invoke, read)
-    return version("ai-edge-litert"), runs
-
-
 def torch_runs(checkpoint: Path, feeds: dict[str, Feed], threads: int) -> tuple[str, dict[str, Runner]]:
     """Returns the trained network in PyTorch: eager, channels last, batch normalisation folded as in the exported
     graphs."""
@@ -226,8 +202,6 @@ def prepare(int8: Path, float32: Path, checkpoint: Path, feeds: dict[str, Feed],
         ("Maquette", "fp32"): lambda: maquette_runs(float32, feeds, threads),
         ("OpenVINO", "int8"): lambda: openvino_runs(int8, feeds, threads),
         ("OpenVINO", "fp32"): lambda: openvino_runs(float32, feeds, threads),
-        ("LiteRT (XNNPACK)", "int8"): lambda: litert_runs(int8, feeds, threads),
-        ("LiteRT (XNNPACK)", "fp32"): lambda: litert_runs(float32, feeds, threads),
         ("PyTorch", "fp32"): lambda: torch_runs(checkpoint, feeds, threads),
         ("ncnn", "fp32"): lambda: ncnn_runs(checkpoint, feeds, threads),
     }

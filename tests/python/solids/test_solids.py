@@ -189,10 +189,10 @@ def test_a_seed_that_takes_its_process_down_is_drawn_again():
 
 
 def test_a_dataset_does_not_depend_on_processes_and_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(dataset, "SEEDS_OF_SHARD", 2)
+    monkeypatch.setattr(dataset, "SEEDS_OF_SHARD", 1)
     folders = tmp_path / "one", tmp_path / "two"
     for folder, processes in zip(folders, ("0", "2"), strict=True):
-        arguments = ["dataset", "train", "--count", str(3 * VIEWS * CROPS_OF_VIEW), "--out", str(folder)]
+        arguments = ["dataset", "train", "--count", str(2 * VIEWS * CROPS_OF_VIEW), "--out", str(folder)]
         monkeypatch.setattr(sys, "argv", [*arguments, "--processes", processes])
         dataset.main()
     paths = [sorted(folder.glob("*.npz")) for folder in folders]

@@ -80,7 +80,7 @@ WALKING = {"upper_leg.L": (-25, 0, 0), "lower_leg.L": (15, 0, 0), "upper_leg.R":
 
 
 @needs_body
-@pytest.mark.parametrize("yaw", [0, 50, 180])
+@pytest.mark.parametrize("yaw", [50, 180])
 def test_a_known_pose_is_found_again(teacher, yaw):
     target, label = truth(teacher, WALKING | {"pelvis": (0, 0, yaw)})
     found = teacher.person(target)

@@ -206,13 +206,13 @@ def test_boxes_are_learnt_in_every_nth_step_and_a_resumed_run_keeps_count(run, t
 
 
 def test_a_run_made_longer_goes_on_from_where_its_rate_still_stood(run, tmp_path):
-    """Two steps of which one decays, made four of which one decays, are the four of a run that knew it before."""
-    straight = run(tmp_path / "long", "--steps", "4", "--decay", "0.25")
-    run(tmp_path / "short", "--steps", "2", "--decay", "0.5")
-    more = run(tmp_path / "short", "--steps", "4", "--decay", "0.25")
-    assert len(more) in (2, 3)
+    """Four steps of which two decay, made six of which two decay, are the six of a run that knew it before."""
+    straight = run(tmp_path / "long", "--steps", "6", "--decay", "0.33")
+    run(tmp_path / "short", "--steps", "4", "--decay", "0.5")
+    more = run(tmp_path / "short", "--steps", "6", "--decay", "0.33")
+    assert len(more) in (3, 4)
     assert [loss for loss, _ in more] == pytest.approx([loss for loss, _ in straight[-len(more) :]], rel=1e-5)
-    assert run(tmp_path / "short", "--steps", "4", "--decay", "0.25") == []
+    assert run(tmp_path / "short", "--steps", "6", "--decay", "0.33") == []
 
 
 def test_crops_are_validated_on_true_boxes_and_axes(shards):

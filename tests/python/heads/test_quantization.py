@@ -141,13 +141,14 @@ def test_a_new_encoder_takes_the_prior_of_a_bundle_over(fp32, int8, data, tmp_pa
     shutil.copy(out / "prior.maqp", other)
     export_encoder(lively_encoder(1), other / "encoder.onnx")
     write_manifest(other, BundleInfo("heads-fp32", "fp32", training_data=({"name": "cubes"},)))
-    command(monkeypatch, other, data, out, "--keep", str(out))
-    manifest = read_manifest(out)
-    assert (out / "prior.maqp").read_bytes() == prior
-    assert (out / "encoder.onnx").read_bytes() != encoder
-    assert manifest["measured"]["bases_cost"] == before["measured"]["bases_cost"]
-    assert manifest["measured"]["int8_cost"] != before["measured"]["int8_cost"]
-    assert manifest["training_data"] == [{"name": "cubes"}]
+    for target in (tmp_path / "new", out):
+        command(monkeypatch, other, data, target, "--keep", str(out))
+        manifest = read_manifest(target)
+        assert (target / "prior.maqp").read_bytes() == prior
+        assert (target / "encoder.onnx").read_bytes() != encoder
+        assert manifest["measured"]["bases_cost"] == before["measured"]["bases_cost"]
+        assert manifest["measured"]["int8_cost"] != before["measured"]["int8_cost"]
+        assert manifest["training_data"] == [{"name": "cubes"}]
 
 
 def test_bases_that_are_int8_already_are_refused(fp32, data, tmp_path, monkeypatch):

@@ -38,8 +38,8 @@ def spread(points: np.ndarray, count: int) -> np.ndarray:
     return np.array(chosen)
 
 
-def places(shapes: HeadShapes, skin: np.ndarray) -> dict[str, np.ndarray]:
-    """Named places of the template, dm. skin: numbers of vertices that are seen from outside."""
+def landmarks(shapes: HeadShapes, skin: np.ndarray) -> dict[str, np.ndarray]:
+    """Landmarks of the template, dm. skin: numbers of vertices that are seen from outside."""
     p = shapes.template[skin]
     eyes = shapes.template[np.unique(shapes.eye_faces)]
     middle = np.abs(p[:, 0]) < 0.05
@@ -110,7 +110,7 @@ def make_prior(saved: dict, maker: HeadMaker, visible: np.ndarray) -> Prior:
         anchor_mean=mean.astype(single),
         anchor_linear=linear.astype(single),
         anchor_sigma=sigma.astype(single),
-        places={name: p.astype(single) for name, p in places(shapes, np.unique(maker.faces)).items()},
+        landmarks={name: p.astype(single) for name, p in landmarks(shapes, np.unique(maker.faces)).items()},
     )
 
 

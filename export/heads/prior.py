@@ -14,9 +14,9 @@ import numpy as np
 SURFACE_OUTPUTS = 6  # logits of red, green and blue, then the template point
 MAX_OCTAVES, MAX_WIDTH, MAX_LAYERS, MAX_CODES = 8, 256, 8, 512
 MIN_ANCHORS, MAX_ANCHORS = 4, 16384
-MAX_PLACES, MAX_PLACE_NAME = 256, 64  # names in bytes
+MAX_LANDMARKS, MAX_LANDMARK_NAME = 256, 64  # names in bytes
 MAX_EXTENT_DM = 8.0
-# Landmarks that programs look for in `Prior.places`; others are allowed.
+# Landmarks that programs look for in `Prior.landmarks`; others are allowed.
 PLACES = (
     "nose_tip", "nose_bridge", "chin", "crown", "pupil_left", "pupil_right", "temple_left", "temple_right",
     "ear_top_left", "ear_top_right", "ear_bottom_left", "ear_bottom_right",
@@ -102,7 +102,7 @@ class Prior:
     anchor_mean: np.ndarray  # [M, 3]: where they lie on a head with codes 0
     anchor_linear: np.ndarray  # [M, 3, K]: what a unit of a shape code adds
     anchor_sigma: np.ndarray  # [M]: standard deviation, each coordinate, of what the linear function leaves
-    places: dict[str, np.ndarray] = field(default_factory=dict)  # name -> [3] on the template head
+    landmarks: dict[str, np.ndarray] = field(default_factory=dict)  # name -> [3] on the template head
 
     @property
     def shape_codes(self) -> int:
@@ -180,12 +180,12 @@ def check_prior(prior: Prior) -> None:
     _check_array("anchor_mean", prior.anchor_mean, (count, 3), -reach, reach)
     _check_array("anchor_linear", prior.anchor_linear, (count, 3, prior.shape_codes), -reach, reach)
     _check_array("anchor_sigma", prior.anchor_sigma, (count,), np.float32(1e-5), 10)
-    if len(prior.places) > MAX_PLACES:
-        raise PriorError(f"There are {len(prior.places)} places, but at most {MAX_PLACES} can be stored.")
-    for name, point in prior.places.items():
-        if not 1 <= len(name.encode()) <= MAX_PLACE_NAME:
-            raise PriorError(f"The name of a place, {name!r}, must have 1 to {MAX_PLACE_NAME} bytes.")
-        _check_array(f"place {name}", point, (3,), -reach, reach)
+    if len(prior.landmarks) > MAX_LANDMARKS:
+        raise PriorError(f"There are {len(prior.landmarks)} landmarks, but at most {MAX_LANDMARKS} can be stored.")
+    for name, point in prior.landmarks.items():
+        if not 1 <= len(name.encode()) <= MAX_LANDMARK_NAME:
+            raise PriorError(f"The name of a landmark, {name!r}, must have 1 to {MAX_LANDMARK_NAME} bytes.")
+        _check_array(f"landmark {name}", point, (3,), -reach, reach)
 
 
 def _check_array(name: str, values: np.ndarray, sizes: tuple[int, ...], low: float = -1e30, high: float = 1e30) -> None:

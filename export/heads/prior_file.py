@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from export.checked_file import START, checked_head, signed, write_whole
-from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_PLACES, Prior, PriorError, check_prior
+from export.heads.prior import MAX_ANCHORS, MAX_CODES, MAX_LANDMARKS, Prior, PriorError, check_prior
 from export.heads.stored_numbers import (
     FLOATS,
     FORMATS,
@@ -20,8 +20,8 @@ from export.heads.stored_numbers import (
     NumberReader,
     shape_of,
     stored,
+    stored_landmark,
     stored_layer,
-    stored_place,
 )
 
 MAGIC, VERSION = b"MAQPRI\r\n", 1
@@ -32,7 +32,7 @@ HEAD = np.dtype(
         ("shape_codes", "<u4"),
         ("colour_codes", "<u4"),
         ("anchors", "<u4"),
-        ("places", "<u4"),
+        ("landmarks", "<u4"),
         ("constant_format", "u1"),  # FORMATS, not int8
         ("bases_format", "u1"),  # FORMATS
         ("zero", "u1", 2),
@@ -65,13 +65,13 @@ def prior_bytes(prior: Prior, bases: str = "int8", constant: str = "float16") ->
     for name in ("shape_codes", "colour_codes", "sharpness", "cut_point", "cut_normal", "bounds_min", "bounds_max"):
         head[name] = getattr(prior, name)
     head["shape"] = tuple(getattr(prior.shape, name) for name in SHAPE.names)
-    head["anchors"], head["places"] = len(prior.anchor_sigma), len(prior.places)
+    head["anchors"], head["landmarks"] = len(prior.anchor_sigma), len(prior.landmarks)
     head["constant_format"], head["bases_format"] = FORMATS[constant], FORMATS[bases]
     parts = [part for layer in prior.constant for part in stored_layer(layer, constant)]
     parts += [part for layer in prior.shape_bases + prior.colour_bases for part in stored_layer(layer, bases)]
     parts += [stored(values, "float32") for values in (prior.template_points, prior.anchor_mean)]
     parts += [stored(prior.anchor_linear, "float16"), stored(prior.anchor_sigma, "float32")]
-    parts += [part for name, point in prior.places.items() for part in stored_place(name, point)]
+    parts += [part for name, point in prior.landmarks.items() for part in stored_landmark(name, point)]
     return signed(head, MAGIC, VERSION, b"".join(parts))
 
 
@@ -88,8 +88,8 @@ def prior_from_bytes(data: bytes, name: str = "The prior in memory") -> Prior:
     counts = int(head["shape_codes"]), int(head["colour_codes"])
     if formats[0] not in FLOATS or formats[1] not in FORMATS.values() or head["zero"].any() or head["more_zeros"].any():
         raise PriorError(f"{name} stores its numbers in a way that version {VERSION} does not have.")
-    if max(counts) > MAX_CODES or head["anchors"] > MAX_ANCHORS or head["places"] > MAX_PLACES:
-        raise PriorError(f"{name} claims more codes, anchors or places than can be used.")
+    if max(counts) > MAX_CODES or head["anchors"] > MAX_ANCHORS or head["landmarks"] > MAX_LANDMARKS:
+        raise PriorError(f"{name} claims more codes, anchors or landmarks than can be used.")
     read = NumberReader(data, HEAD.itemsize, name)
     constant = [read.layer(shape, index, (), formats[0]) for index in range(shape.layers)]
     bases = [
@@ -99,10 +99,10 @@ def prior_from_bytes(data: bytes, name: str = "The prior in memory") -> Prior:
     anchors = int(head["anchors"])
     points, mean = (read.numbers((anchors, 3), FLOATS[0]) for _ in range(2))
     linear, sigma = read.numbers((anchors, 3, counts[0]), FLOATS[1]), read.numbers((anchors,), FLOATS[0])
-    places = dict(read.place() for _ in range(int(head["places"])))
+    landmarks = dict(read.landmark() for _ in range(int(head["landmarks"])))
     read.end()
     planes = [head[key].copy() for key in ("cut_point", "cut_normal", "bounds_min", "bounds_max")]
-    prior = Prior(shape, constant, *bases, float(head["sharpness"]), *planes, points, mean, linear, sigma, places)
+    prior = Prior(shape, constant, *bases, float(head["sharpness"]), *planes, points, mean, linear, sigma, landmarks)
     check_prior(prior)
     return prior
 

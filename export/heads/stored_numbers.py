@@ -54,7 +54,7 @@ def stored_layer(layer: Layer, form: str) -> list[bytes]:
     return [stored(scales, "float32"), steps.tobytes(), stored(layer.bias, "float16")]
 
 
-def stored_place(name: str, point: np.ndarray) -> list[bytes]:
+def stored_landmark(name: str, point: np.ndarray) -> list[bytes]:
     return [bytes([len(name.encode())]), name.encode(), stored(point, "float32")]
 
 
@@ -83,7 +83,7 @@ class NumberReader:
         steps = self.numbers(sizes, np.dtype("i1"))
         return Layer(steps * scales[..., None], self.numbers(sizes[:-1], FLOATS[1]))
 
-    def place(self) -> tuple[str, np.ndarray]:
+    def landmark(self) -> tuple[str, np.ndarray]:
         length = int(self.records(1, np.dtype("u1"))[0])
         name = self.records(length, np.dtype("u1")).tobytes().decode(errors="replace")
         return name, self.numbers((3,), FLOATS[0])

@@ -79,7 +79,7 @@ def prior() -> Prior:
     angle = 2.399963 * np.arange(count)
     directions = np.stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z], 1)
     points = on_template(directions)
-    places = {
+    landmarks = {
         "nose_tip": (0, -1, 0),
         "chin": (0, -0.6, -0.8),
         "crown": (0, 0, 1),
@@ -100,7 +100,7 @@ def prior() -> Prior:
         anchor_mean=points.astype(np.float32),
         anchor_linear=(-STRETCH * points[:, :, None] * np.eye(3)).astype(np.float32),
         anchor_sigma=np.full(count, 0.01, np.float32),
-        places={name: on_template(np.array(d)).astype(np.float32) for name, d in places.items()},
+        landmarks={name: on_template(np.array(d)).astype(np.float32) for name, d in landmarks.items()},
     )
 
 

@@ -2,7 +2,7 @@
 
 `priors/<format>.maqp`: with bases in float32, float16 and int8; `priors/<format>.f32`, little-endian floats: each layer
 of the head with codes SHAPE_CODES and COLOUR_CODES (weights, bias), sharpness, cut (point, normal), bounds (min, max),
-anchors (template points, mean, linear, sigma), template points of the places.
+anchors (template points, mean, linear, sigma), template points of the landmarks.
 
 `bundle`: an encoder of one convolution, crops of 32 px and cells of 4 px, and the prior with int8 bases. `photo.bgr`:
 32 x 32 pixels of noise, B, G, R bytes; `cells.f32`: what the encoder says of it [8][8][8].
@@ -52,7 +52,7 @@ def write_priors(folder: Path) -> None:
         arrays = [array for layer in layers for array in (layer.weights, layer.bias)]
         arrays += [np.array([prior.sharpness]), prior.cut_point, prior.cut_normal, prior.bounds_min, prior.bounds_max]
         arrays += [prior.template_points, prior.anchor_mean, prior.anchor_linear, prior.anchor_sigma]
-        arrays += list(prior.places.values())
+        arrays += list(prior.landmarks.values())
         np.concatenate([array.ravel() for array in arrays]).astype("<f4").tofile(path.with_suffix(".f32"))
 
 

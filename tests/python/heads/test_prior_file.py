@@ -98,7 +98,7 @@ def test_every_byte_that_is_missing_or_changed_is_noticed():
         ("anchors", 8, "ends before|belong to nothing"),
         ("anchors", 1 << 31, "claims more"),
         ("shape_codes", 513, "claims more"),
-        ("places", 3, "ends before"),
+        ("landmarks", 3, "ends before"),
         ("sharpness", np.nan, "sharpness"),
         ("cut_normal", 1, "length 1"),
         ("bounds_min", 1, "bounds_min"),
@@ -129,7 +129,7 @@ def test_priors_that_the_sdk_would_refuse_are_not_written():
         ({"cut_normal": np.ones(3)}, "length 1"),
         ({"bounds_max": np.array([1.0, 0, 1])}, "bounds_max"),
         ({"anchor_sigma": prior.anchor_sigma * 0}, "anchor_sigma"),
-        ({"places": {"": np.zeros(3)}}, "name of a place"),
+        ({"landmarks": {"": np.zeros(3)}}, "name of a landmark"),
     ):
         with pytest.raises(PriorError, match=text):
             prior_bytes(replace(prior, **change))

@@ -40,5 +40,5 @@ def small_prior(
         anchor_mean=points + numbers(anchors, 3, scale=0.02),
         anchor_linear=numbers(anchors, 3, shape_codes, scale=0.05),
         anchor_sigma=np.abs(numbers(anchors, scale=0.02)) + np.float32(0.01),
-        places={"nose_tip": np.array([0, -1.25, 0.1], np.float32), "chin": np.array([0.0, -0.9, -0.9], np.float32)},
+        landmarks={"nose_tip": np.array([0, -1.25, 0.1], np.float32), "chin": np.array([0.0, -0.9, -0.9], np.float32)},
     )

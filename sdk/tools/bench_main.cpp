@@ -1,18 +1,18 @@
-// `maquette bench`: how long each stage of a frame takes on this machine; of prediction in bench/prediction_bench.cpp.
+// `maquette bench`: how long each stage of a frame takes on this machine.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "arguments/densepose_options.h"
 #include "arguments/source_argument.h"
-#include "bench/prediction_bench.h"
-#include "bench/stage_times.h"
 #include "interrupt.h"
 #include "machine.h"
 #include "output/output_file.h"
@@ -27,6 +27,8 @@ constexpr const char* kSchema = "maquette-bench-3";
 // them.
 constexpr int kBlock = 10;
 constexpr double kMibibyte = 1024.0 * 1024.0;
+constexpr double kMaxOthers = 0.05;  // of all cores: more, and the figures are of other processes too
+constexpr double kMaxSpread = 1.5;   // p90 by p50
 
 struct Options {
   std::vector<std::string> sources = {"stub:people?count=1", "stub:people?count=4", "stub:people?count=0"};
@@ -43,6 +45,67 @@ using Json = nlohmann::ordered_json;
 // The stages of a frame in their order: taking it from the source, those of maq_densepose_stats, and all of it.
 const std::vector<const char*> kStages = {"capture",    "preprocess", "trunk",  "proposals", "box_head",
                                           "dense_head", "crops",      "decode", "frame"};
+
+// Times of the stages of one source, run by run, and why they may be unreliable.
+class StageTimes {
+ public:
+  // A run: a time for each stage, all of the run last, and the CPU time of all threads meanwhile.
+  void add(const std::vector<double>& ms, double processor_s) {
+    for (size_t i = 0; i < ms_.size(); ++i) ms_[i].push_back(ms.at(i));
+    seconds_ += ms.back() / 1e3;
+    processor_s_ += processor_s;
+  }
+
+  size_t runs() const { return ms_[0].size(); }
+  double seconds() const { return seconds_; }
+  double percentile_ms(size_t stage, double percent) const {
+    std::vector<double> sorted = ms_[stage];
+    if (sorted.empty()) return 0;
+    std::sort(sorted.begin(), sorted.end());
+    const double at = percent / 100 * double(sorted.size() - 1);
+    const size_t low = size_t(at);
+    const size_t high = std::min(low + 1, sorted.size() - 1);
+    return sorted[low] + (sorted[high] - sorted[low]) * (at - double(low));
+  }
+  double median_ms() const { return percentile_ms(kStages.size() - 1, 50); }
+  double runs_per_second() const { return 1e3 / std::max(1e-6, median_ms()); }
+  double processor_ms() const { return 1e3 * processor_s_ / double(std::max<size_t>(1, runs())); }
+  double cores_busy() const { return processor_s_ / std::max(1e-6, seconds_); }
+
+  // Empty if the times are reliable.
+  std::vector<std::string> warnings(int min_runs, double min_seconds) const {
+    std::vector<std::string> reasons;
+    char text[128];
+    if (runs() < size_t(min_runs) || seconds_ < min_seconds) {
+      std::snprintf(text, sizeof text, "%zu runs in %.1f s, %d and %.1f s asked for", runs(), seconds_, min_runs,
+                    min_seconds);
+      reasons.emplace_back(text);
+    }
+    const double spread = percentile_ms(kStages.size() - 1, 90) / std::max(1e-6, median_ms());
+    if (spread > kMaxSpread) {
+      std::snprintf(text, sizeof text, "p90 is %.2f times p50, %.2f allowed", spread, kMaxSpread);
+      reasons.emplace_back(text);
+    }
+    return reasons;
+  }
+  Json ms_json() const {
+    Json ms;
+    for (size_t i = 0; i < kStages.size(); ++i) {
+      for (const int percent : {50, 90, 99}) {
+        ms[kStages[i]]["p" + std::to_string(percent)] = rounded_ms(percentile_ms(i, percent));
+      }
+    }
+    return ms;
+  }
+
+ private:
+  std::vector<std::vector<double>> ms_ = std::vector<std::vector<double>>(kStages.size());
+  double seconds_ = 0, processor_s_ = 0;
+};
+
+double ms_between(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double, std::milli>(to - from).count();
+}
 
 // One source with the times of its frames.
 class Case {
@@ -125,7 +188,7 @@ class Case {
   std::string uri_;
   std::unique_ptr<maquette::Source> source_;
   std::optional<StoppedByInterrupt> stopped_;
-  StageTimes times_{kStages};
+  StageTimes times_;
   maq_densepose_stats stats_{};
   std::array<int32_t, 2> size_px_{};
   std::optional<uint64_t> last_sequence_;
@@ -173,7 +236,8 @@ int run_bench(const Options& options) {
   for (const auto& timed : cases) {
     for (int i = 0; i < options.warm_up && !interrupted(); ++i) timed->run(densepose, false);
   }
-  const OtherProcesses other_processes;
+  const double others_before_s = others_processor_seconds();
+  const auto measured_from = Clock::now();
   ProgressBar progress("measuring", int64_t(cases.size()) * options.runs);
   const auto unfinished = [&](const Case& timed) {
     return timed.times().runs() < size_t(options.runs) || timed.times().seconds() < options.seconds;
@@ -192,8 +256,15 @@ int run_bench(const Options& options) {
     }
   }
   progress.finish();
-  const double others = other_processes.cpu_fraction();
-  const std::vector<std::string> reasons = OtherProcesses::warnings(others);
+  const double measured_s = std::max(1e-3, ms_between(measured_from, Clock::now()) / 1e3);
+  const double others = std::max(0.0, others_processor_seconds() - others_before_s) /
+                        (measured_s * std::max(1u, std::thread::hardware_concurrency()));
+  std::vector<std::string> reasons;
+  if (others > kMaxOthers) {
+    char text[64];
+    std::snprintf(text, sizeof text, "other processes used %.0f %% of the CPU", 100 * others);
+    reasons.emplace_back(text);
+  }
   Json document;
   document["schema"] = kSchema;
   document["machine"] = describe_machine();
@@ -246,62 +317,30 @@ int run_bench(const Options& options) {
 int main(int argc, char** argv) try {
   CLI::App app("Measure how long each stage of a frame takes on this machine", "maquette bench");
   Options options;
-  PredictionBenchOptions prediction;
-  bool predicts = false;
   std::vector<std::string> sources;
   app.add_option("source", sources,
-                 "Images, clips or URIs, measured alternately; default: one, four and no people of stub:people. With "
-                 "--predict one clip or camera; default: two people of stub:people");
-  CLI::Option* const predict = app.add_flag(
-      "--predict", predicts,
-      "Measure prediction instead of dense pose: novelty of a frame, the next frame by each method, and samples");
+                 "Images, clips or URIs, measured alternately; default: one, four and no people of stub:people");
   app.add_option("--json", options.json,
                  "Also write everything to this file (docs/reference/formats.md, \"Benchmarks\")");
   add_model_options(app, options.model);
-  for (const char* of_dense_pose : {"--no-spin", "--provider", "--size", "--threshold", "--max-proposals",
-                                    "--key-frames", "--min-person-height", "--crops", "--crop-size", "--no-surface"}) {
-    app.get_option(of_dense_pose)->excludes(predict);
-  }
-  app.add_option("--warm-up", options.warm_up, "Frames of each source, or case, that are not counted (default 10)")
+  app.add_option("--warm-up", options.warm_up, "Frames of each source that are not counted (default 10)")
       ->check(CLI::Range(0, 100000));
-  CLI::Option* const runs =
-      app.add_option("--runs", options.runs,
-                     "Minimum number of frames of each source (default 100), or runs of each case (default 20)")
-          ->check(CLI::Range(1, 1000000));
-  app.add_option("--seconds", options.seconds, "Minimum time of each source, or case, in seconds (default 3)")
+  app.add_option("--runs", options.runs, "Minimum number of frames of each source (default 100)")
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--seconds", options.seconds, "Minimum time of each source in seconds (default 3)")
       ->check(CLI::Range(0.0, 86400.0));
   app.footer(
       "The time of a frame begins when the source is asked for it and ends with the result. CPU ms is the CPU time of\n"
       "all threads for one frame; it is a measure of energy on every machine. Compare times of one run only. A "
       "warning\n"
       "says why times are unreliable: other processes, few runs, wide spread.\n\n"
-      "With --predict all cases run alternately over the same 16 frames of the source, held in memory. Samples are\n"
-      "computed at 64 x 64 pixels, other cases at full size. A run of novelty is one frame with its map. A run of a\n"
-      "predictor pushes one frame and predicts the next. A run of \"11 sampled\" samples 11 frames and decodes one.\n\n"
       "Examples:\n"
       "  maquette bench\n"
-      "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json\n"
-      "  maquette bench --predict                             # a minute; novelty and frames a second\n"
-      "  maquette bench --predict clip.mp4 --threads 1 --json bench.json");
+      "  maquette bench 'stub:people?count=2&size=1280x720' clip.mp4 --threads 1 --json bench.json");
   int exit_code = 0;
   app.callback([&] {
-    if (!predicts) {
-      if (!sources.empty()) options.sources = sources;
-      exit_code = run_bench(options);
-      return;
-    }
-    if (sources.size() > 1) throw std::runtime_error("--predict measures one source; name one clip or camera.");
-    if (options.model.threads == MAQ_THREADS_MEASURED) {
-      throw std::runtime_error("--predict takes a number of --threads, 1 to 64.");
-    }
-    if (!sources.empty()) prediction.source = sources.front();
-    prediction.bundle = options.model.bundle;
-    prediction.json = options.json;
-    prediction.threads = options.model.threads;
-    prediction.warm_up = options.warm_up;
-    if (!runs->empty()) prediction.runs = options.runs;
-    prediction.seconds = options.seconds;
-    exit_code = run_prediction_bench(prediction);
+    if (!sources.empty()) options.sources = sources;
+    exit_code = run_bench(options);
   });
   return run_program(app, argc, argv, &exit_code);
 } catch (const std::exception& error) {  // no memory for the options

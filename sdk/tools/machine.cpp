@@ -4,6 +4,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <set>
@@ -92,7 +93,10 @@ double others_processor_seconds() {
 
 int64_t peak_memory_bytes() { return 1024 * kibibytes(value_of("/proc/self/status", "VmHWM")); }
 
+double seconds_since_boot() { return seconds_of(CLOCK_BOOTTIME); }
+
 double seconds_since_start() {
+  if (const char* started_s = std::getenv(kStartVariable)) return seconds_since_boot() - std::atof(started_s);
   std::ifstream file("/proc/self/stat");
   std::string text((std::istreambuf_iterator<char>(file)), {});
   // The program's name may hold spaces and stands in parentheses; the start time is the 20th field after it.
@@ -100,5 +104,5 @@ double seconds_since_start() {
   std::string field;
   for (int i = 0; i < 20; ++i) fields >> field;
   const double started_s = field.empty() ? 0 : std::stod(field) / double(sysconf(_SC_CLK_TCK));
-  return seconds_of(CLOCK_BOOTTIME) - started_s;
+  return seconds_since_boot() - started_s;
 }

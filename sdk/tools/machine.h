@@ -22,5 +22,8 @@ double others_processor_seconds();
 // The most memory that this process has held so far ("peak RSS"); 0 if the system does not say.
 int64_t peak_memory_bytes();
 
-// Since the process was started, loading of libraries included; resolution .01 s.
+// Seconds since the system started, and since this process started (loading of libraries included, resolution 0.01 s).
+// A program that starts another one in its place passes the time of that start in the environment variable.
+inline constexpr const char* kStartVariable = "MAQ_PROGRAM_STARTED_S";
+double seconds_since_boot();
 double seconds_since_start();

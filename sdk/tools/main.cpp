@@ -40,7 +40,7 @@ int main(int argc, char** argv) try {
 #if MAQ_HAS_SCENES
   add_scene_command(app, &exit_code);
 #endif
-#if MAQ_HAS_DENSEPOSE && MAQ_HAS_PREDICTION
+#if MAQ_HAS_DENSEPOSE
   add_bench_command(app, &exit_code);
 #endif
   return run_program(app, argc, argv, &exit_code);

@@ -103,8 +103,6 @@ WRONG_USES = (
     ("scene", "build", str(CAPTURE), "--out", "b.maqs", "--bundle", str(PEOPLE_BUNDLE)),
     ("densepose", "a.jpg", "--out", "out", "--bundle", str(SCENE_BUNDLE)), ("play", "b.maqrec"), ("play", "a.maqs"),
     ("bench", "nothing.jpg", "--bundle", str(PEOPLE_BUNDLE)), ("bench", "--bundle", "/nonexistent"),
-    ("bench", "--predict", "a.jpg"), ("bench", "--predict", "b.maqrec"),
-    ("bench", "--predict", "--bundle", "/nonexistent"),
     ("head",), ("head", "a.jpg"), ("head", "a.jpg", "--out", "b.stl"), ("head", "a.maqs", *HEAD[2:], "--out", "b.glb"),
     ("head", "a.jpg", "--out", "b.glb", "--bundle", str(PEOPLE_BUNDLE)), ("head", "info", "a.jpg"), ("head", "info"),
     (*HEAD[:-1], "90,10,95,40", "--out", "b.glb"), ("predict",), ("predict", "a.maqrec", "--out", "b.xyz"),

@@ -10,12 +10,10 @@
 struct SampleOptions {
   int samples = 0;  // 0: none
   double temperature = 1;
-  uint32_t top_k = 0;
   uint64_t seed = 0;
 
   void apply(maq_predictor_config* config) const {
     config->temperature = float(temperature);
-    config->top_k = top_k;
     config->seed = seed;
   }
 };

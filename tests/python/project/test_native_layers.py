@@ -107,7 +107,6 @@ TOOLS_MAY_INCLUDE = {
     ".": set(),
     "arguments": {"."},
     "output": {"."},
-    "bench": {".", "arguments", "output"},
     "commands": {".", "arguments", "output"},
     "commands/head": {".", "arguments", "commands", "output"},
     "commands/prediction": {".", "arguments", "commands", "output"},

@@ -315,15 +315,13 @@ void add_sample_options(CLI::App& command, SampleOptions& sampling) {
       .add_option("--temperature", sampling.temperature,
                   "For sampling: 1 (default) samples by the probabilities, 0 takes the likeliest code")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--top-k", sampling.top_k, "For sampling: sample from the K likeliest codes; default: all")
-      ->check(CLI::Range(0u, 512u));
   command.add_option("--seed", sampling.seed, "For sampling: equal seeds give equal samples; default: 0");
 }
 
 // Throws for options of sampling without sampling.
 void require_sampling(const CLI::App& command, const PredictOptions& options) {
   if (options.sampling.samples > 0 || options.method == MAQ_PREDICTOR_SAMPLED) return;
-  for (const char* name : {"--temperature", "--top-k", "--seed"}) {
+  for (const char* name : {"--temperature", "--seed"}) {
     if (command.count(name) > 0) throw CLI::RequiresError(name, "--samples or --method sampled");
   }
 }

@@ -179,18 +179,12 @@ TEST_F(ApiClips, WhatIsNoClipIsRefusedAndLeavesNoFile) {
   expect_refused(folder_.file("folder.mp4"), 25, MAQ_ERROR_UNWRITABLE, "is not a file");
   EXPECT_EQ(files_in(folder_.path()), 1u);
   maq_clip* clip = nullptr;
-  EXPECT_EQ(maq_clip_create(nullptr, "a.mp4", 25, &clip), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_clip_create(context_.get(), nullptr, 25, &clip), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_clip_create(context_.get(), "a.mp4", 25, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_clip_add_frame(nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_clip_finish(nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(clip, nullptr);
-  maq_clip_destroy(nullptr);
 }
 
 TEST_F(ApiClips, PicturesThatFitNoClipAreRefusedByName) {
   maquette::Clip clip(context_, folder_.file("a.mp4"), 10);
-  EXPECT_EQ(maq_clip_add_frame(clip.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   const std::vector<uint8_t> depth(8 * 8 * 2);
   EXPECT_EQ(status_of([&] { clip.add(maquette::Frame(context_, describe(MAQ_PIXEL_DEPTH16, depth, 8, 8))); }),
             MAQ_ERROR_UNSUPPORTED);

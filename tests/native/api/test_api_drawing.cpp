@@ -158,7 +158,6 @@ TEST_F(ApiDrawing, WhatCannotBeDrawnIsASentence) {
   expect_refused("drawing.opacity is 256", [](auto& drawing) { drawing.opacity = 256; });
   expect_refused("drawing.is_mirrored is 2", [](auto& drawing) { drawing.is_mirrored = 2; });
   expect_refused("drawing.struct_size", [](auto& drawing) { drawing.struct_size = 4; });
-  EXPECT_EQ(maq_densepose_result_draw(nullptr, nullptr, nullptr, pixels_.data(), 0, 1), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_densepose_result_draw(result_.get(), nullptr, nullptr, nullptr, 0, kAll), MAQ_ERROR_INVALID_ARGUMENT);
 }
 

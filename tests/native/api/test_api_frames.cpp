@@ -70,9 +70,7 @@ TEST(ApiFrames, AreNotDecodedFromWhatIsNoWholeImage) {
   EXPECT_EQ(decode(""), MAQ_ERROR_UNREADABLE);
   EXPECT_EQ(decode("no image"), MAQ_ERROR_UNREADABLE);
   EXPECT_EQ(decode("GIF89a" + std::string(100, '\0')), MAQ_ERROR_UNSUPPORTED);
-  EXPECT_EQ(maq_frame_decode(nullptr, photo.data(), photo.size(), &frame), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_frame_decode(context.get(), nullptr, photo.size(), &frame), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_frame_decode(context.get(), photo.data(), photo.size(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(frame, nullptr);
 }
 
@@ -235,8 +233,6 @@ TEST(ApiFrames, AreResized) {
   EXPECT_EQ(frame->resized(120, 90).desc().width_px, 120);
   maq_frame* none = nullptr;
   EXPECT_EQ(maq_frame_resize(frame->get(), 0, 10, &none), MAQ_ERROR_IMAGE_SIZE);
-  EXPECT_EQ(maq_frame_resize(frame->get(), 10, 10, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_frame_resize(nullptr, 10, 10, &none), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 // 4 x 2 pixels, with V before U in one plane, as phones have it, and its description.

@@ -142,8 +142,6 @@ TEST_F(ApiHeadRendering, TheCameraOfAPhotoLaysTheHeadOnThePhoto) {
   maq_pinhole_camera none{};
   none.struct_size = sizeof none;
   EXPECT_EQ(maq_head_get_camera(head.get(), 1, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_get_camera(nullptr, 0, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_get_camera(head.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiHeadRendering, ShadingsDifferAndAreSwitched) {
@@ -195,31 +193,8 @@ TEST_F(ApiHeadRendering, ImagesAreBoundedAndOutliveTheRendererAndItsHead) {
   EXPECT_EQ(plane<uint8_t>(held[1], MAQ_IMAGE_PLANE_ALPHA, 1, 64)[24 * 64 + 32], 255);
 }
 
-TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
-  const maquette::HeadMesh shared = mesh();
-  const auto refused = [&](const char* text, auto&& change) {
-    maq_head_renderer_config config = coarse();
-    change(config);
-    maq_head_renderer* made = nullptr;
-    EXPECT_EQ(maq_head_renderer_create(context.get(), &config, shared.get(), &made), MAQ_ERROR_INVALID_ARGUMENT)
-        << text;
-    EXPECT_EQ(made, nullptr);
-    expect_text(text);
-  };
-  using Config = maq_head_renderer_config;
-  int unknown = 9;
+TEST_F(ApiHeadRendering, WrongCamerasAreASentence) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  refused("config.struct_size is 4", [](Config& c) { c.struct_size = 4; });
-  refused("config.threads", [](Config& c) { c.threads = 65; });
-  refused("config.near_m", [](Config& c) { c.near_m = -1; });
-  refused("config.near_m", [&](Config& c) { c.near_m = nan; });
-  refused("config.shading", [&](Config& c) { c.shading = maq_head_shading(unknown); });
-  refused("config.shading_strength", [](Config& c) { c.shading_strength = 1.5f; });
-  refused("config.shading_strength", [](Config& c) { c.shading_strength = -0.5f; });
-  refused("config.disable_antialiasing", [](Config& c) { c.disable_antialiasing = 2; });
-  refused("config.use_background", [](Config& c) { c.use_background = -1; });
-  refused("config.image_pool_size", [](Config& c) { c.image_pool_size = 65; });
-
   maquette::HeadRenderer renderer(context, coarse(), mesh());
   const auto answer = [&](auto&& change) {
     maq_pinhole_camera camera = renderer.camera(0, 0, 64, 48);
@@ -254,10 +229,6 @@ TEST_F(ApiHeadRendering, WrongSettingsAndCamerasAreASentence) {
   camera.struct_size = sizeof camera;
   EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), nan, 0, 64, 48, &camera), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), 0, 0, 64, -1, &camera), MAQ_ERROR_IMAGE_SIZE);
-  EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), 0, 0, 64, 48, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_renderer_run(nullptr, &camera, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  maq_head_renderer_destroy(nullptr);
-  maq_image_release(nullptr);
 }
 
 TEST_F(ApiHeadRendering, TwoRenderersRunInTwoThreads) {

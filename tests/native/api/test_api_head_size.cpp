@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <maquette/maquette.hpp>
 #include <string>
 #include <vector>
@@ -106,8 +105,6 @@ TEST_F(ApiHeadSize, DistancesThatCannotBeAreASentence) {
   refuse("pupil_left", "pupil_left", 0.06, MAQ_ERROR_INVALID_ARGUMENT, "are the same landmark");
   refuse("pupil_left", "elbow", 0.06, MAQ_ERROR_NOT_FOUND, "no landmark named \"elbow\"");
   refuse(nullptr, "chin", 0.06, MAQ_ERROR_INVALID_ARGUMENT, "from");
-  EXPECT_EQ(maq_head_scale_by_distance(head.get(), "chin", "crown", 0.2, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_scale_by_distance(nullptr, "chin", "crown", 0.2, &scaled), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(scaled, nullptr);
 }
 
@@ -184,8 +181,6 @@ TEST_F(ApiHeadSize, HeadsAreOpenedFromMemory) {
   }
   expect_text("The head in memory");
   EXPECT_EQ(maq_head_open_memory(context.get(), nullptr, 10, &made), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_open_memory(context.get(), bytes.data(), bytes.size(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_head_open_memory(nullptr, bytes.data(), bytes.size(), &made), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(made, nullptr);
 }
 

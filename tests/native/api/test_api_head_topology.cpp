@@ -1,7 +1,6 @@
 // Meshes of heads with the template's vertices and morph targets, through the C API.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <maquette/maquette.hpp>
 
 #include "support/samples/round_heads.h"
@@ -46,11 +45,9 @@ TEST_F(ApiHeadTopology, TheTemplatesMeshHasItsVerticesOnTheHeadAndMorphTargets) 
     ASSERT_NEAR(jaw.deltas_m[3 * k + 2], -0.015f, 0.003f) << "15 mm, by the size of the face";
   }
   maq_head_morph_target target{};
-  EXPECT_EQ(maq_head_mesh_get_morph_target(mesh.mesh.get(), 0, &target), MAQ_ERROR_INVALID_ARGUMENT) << "struct_size";
   target.struct_size = sizeof target;
   EXPECT_EQ(maq_head_mesh_get_morph_target(mesh.mesh.get(), 2, &target), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(Mesh(head, coarse).morph_target_count, 0u);
-  EXPECT_EQ(maq_head_mesh_get_morph_target(nullptr, 0, &target), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiHeadTopology, AnOpenedHeadTakesTheTemplateOfTheBundleThatIsNamed) {
@@ -85,11 +82,6 @@ TEST_F(ApiHeadTopology, TopologiesThatThereAreNotAndTrianglesOfTheTemplateAreASe
   options = of_template();
   options.triangle_count = 5000;
   EXPECT_EQ(maq_head_mesh_create(head.get(), &options, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  const int32_t wrong = 2;
-  options = of_template();
-  std::memcpy(&options.topology, &wrong, sizeof wrong);
-  EXPECT_EQ(maq_head_mesh_create(head.get(), &options, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("config.topology is 2");
 }
 
 }  // namespace

@@ -107,7 +107,6 @@ TEST_F(ApiSaving, OtherEndingsAreRefusedAndNothingIsWritten) {
   EXPECT_EQ(files_in(folder_.path()), 0u);
   EXPECT_EQ(maq_frame_save(frame.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(maq_last_error(frame.get()), "maq_frame_save: path is NULL.");
-  EXPECT_EQ(maq_frame_save(nullptr, "a.png"), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiSaving, DepthIsWrittenAsDepthAndReadAgain) {
@@ -234,8 +233,6 @@ TEST_F(ApiSaving, APathEndsWithTheBeginningOfAName) {
     EXPECT_NE(std::string(maq_last_error(result.get())).find("path is"), std::string::npos);
   }
   EXPECT_EQ(files_in(folder_.path()), 0u);
-  EXPECT_EQ(maq_densepose_result_save(nullptr, "a"), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_densepose_result_save(result.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST_F(ApiSaving, ThreadsThatSaveToOneNameLeaveOneWholeFile) {

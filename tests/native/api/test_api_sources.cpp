@@ -51,10 +51,8 @@ TEST(ApiSources, CamerasAreListedAndWrongIndicesRefused) {
   maq_camera_mode mode{};
   mode.struct_size = sizeof mode;
   EXPECT_EQ(maq_camera_list_get_mode(list, count, 0, &mode), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_camera_list_create(context.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(maq_camera_list_get_count(nullptr), 0u);
   maq_camera_list_destroy(list);
-  maq_camera_list_destroy(nullptr);
 }
 
 TEST(ApiSources, PipesWithoutAWriterAndDevicesAreRefused) {
@@ -208,15 +206,6 @@ TEST(ApiSources, OnlyCamerasHaveControls) {
   const maquette::Context context;
   maquette::Source source(context, "stub:pattern?size=16x16");
   EXPECT_FALSE(source.control(MAQ_SOURCE_CONTROL_GAIN).has_value());
-  for (const auto& [value, status] :
-       {std::pair(1.0, MAQ_ERROR_UNSUPPORTED), std::pair(double(NAN), MAQ_ERROR_INVALID_ARGUMENT)}) {
-    try {
-      source.set_control(MAQ_SOURCE_CONTROL_GAIN, value);
-      ADD_FAILURE() << value;
-    } catch (const maquette::Error& error) {
-      EXPECT_EQ(error.status(), status) << error.what();
-    }
-  }
   maq_source* camera = nullptr;
   EXPECT_EQ(maq_source_create(context.get(), "v4l2:/no/such?gain=loud", nullptr, &camera), MAQ_ERROR_INVALID_ARGUMENT);
   EXPECT_STREQ(maq_last_error(context.get()), "gain=loud in v4l2:/no/such?gain=loud must be a number or auto.");

@@ -102,9 +102,6 @@ TEST(ApiSurface, ABundleWithoutOneSaysSo) {
   const maquette::DensePose densepose(context, MAQ_TEST_DATA "/tiny_bundle");
   EXPECT_FALSE(densepose.surface());
   EXPECT_NE(std::string(maq_last_error(densepose.get())).find("no surface grid"), std::string::npos);
-  maq_densepose_surface surface{};
-  EXPECT_EQ(maq_densepose_get_surface(nullptr, &surface), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_densepose_get_surface(densepose.get(), nullptr), MAQ_ERROR_INVALID_ARGUMENT);
 }
 
 TEST(ApiSurface, StructsOfUnknownSizeAreRefused) {

@@ -137,15 +137,6 @@ TEST(FlyCamera, MovesByItsOwnAxesAndTheWorldsUp) {
   EXPECT_NEAR(distance(position(fly.camera(64, 48)), expected), 0, 1e-12) << "no faster than 1";
 }
 
-TEST(FlyCamera, WhatChangesNothingLeavesItAtThePhoto) {
-  maquette::FlyCamera fly(scene(), {photo({1, 2, 3}, {1, 1, -0.5})});
-  fly.move(0, 0, 0, 1, 0.1);
-  fly.rotate(0, 0);
-  fly.zoom(1);
-  EXPECT_FALSE(fly.update(1));
-  EXPECT_EQ(fly.photo_index(), 0);
-}
-
 TEST(FlyCamera, TurnsRightAboutTheWorldsUpAndUpwards) {
   for (const Vec3& up : {Vec3{0, 0, 1}, unit({0.3, -1, 0.2})}) {
     const maquette::FlyCamera start(scene(up), {});
@@ -281,32 +272,6 @@ TEST(FlyCamera, FliesSmoothlyAndEndsExactlyAtThePhoto) {
   expect_same(*fly.photo_camera(), target);
 }
 
-TEST(FlyCamera, FliesByHalfATurnAboutAnyAxis) {
-  const maq_pinhole_camera start = photo({0, 0, 0}, {1, 0.4, -0.3}, 0.7);
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double off : {0.0, 2e-16, 1e-9, 1e-7, -1e-4}) {
-      maq_pinhole_camera target = start;
-      for (int i = 0; i < 9; ++i) target.rotation[i] *= i / 3 == axis ? 1 : -1;
-      // Not quite 180 degrees: each row is rotated a little more about the axis.
-      const Vec3 a = row(start, axis);
-      for (int i = 0; i < 3; ++i) {
-        const Vec3 more = cross(a, row(target, i));
-        for (size_t k = 0; k < 3; ++k) target.rotation[3 * i + int(k)] += off * more[k];
-      }
-      maquette::FlyCamera fly(scene(), {start});
-      fly.fly_to(target, 1, 0);
-      maq_pinhole_camera before = start;
-      while (fly.update(0.01)) {
-        const maq_pinhole_camera now = fly.camera(640, 480);
-        expect_rotation(now);
-        for (int i = 0; i < 3; ++i) EXPECT_GT(dot(row(before, i), row(now, i)), std::cos(0.06)) << axis << " " << off;
-        before = now;
-      }
-      for (int i = 0; i < 3; ++i) EXPECT_GT(dot(row(before, i), row(target, i)), 1 - 1e-7);
-    }
-  }
-}
-
 TEST(FlyCamera, SteeringEndsAFlight) {
   const std::vector<maq_pinhole_camera> photos{photo({1, 2, 3}, {1, 1, -0.5}), photo({4, -2, 1}, {-1, 0.3, 0.1})};
   for (int way = 0; way < 3; ++way) {
@@ -323,14 +288,6 @@ TEST(FlyCamera, SteeringEndsAFlight) {
   }
 }
 
-TEST(FlyCamera, AFlightOfNoTimeIsThereAtOnce) {
-  const maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1});
-  maquette::FlyCamera fly(scene(), {});
-  fly.fly_to(target, 0, 3);
-  expect_same(fly.camera(640, 480), target);
-  EXPECT_EQ(fly.photo_index(), 3);
-}
-
 TEST(FlyCamera, FindsTheNearestPhotoByPlaceAndDirection) {
   const std::vector<maq_pinhole_camera> photos{photo({0, 0, 0}, {1, 0, 0}), photo({0.1, 0, 0}, {-1, 0, 0}),
                                                photo({3, 0, 0}, {1, 0, 0})};
@@ -341,24 +298,6 @@ TEST(FlyCamera, FindsTheNearestPhotoByPlaceAndDirection) {
   fly.fly_to(photos[2], 0, 2);
   EXPECT_EQ(fly.nearest_photo(photos), 2);
   EXPECT_EQ(fly.nearest_photo({}), -1);
-}
-
-TEST(FlyCamera, IsARotationAfterThousandsOfMoves) {
-  for (const Vec3& up : {Vec3{0, 0, 1}, unit({-1, 2, 0.3})}) {
-    std::mt19937 random(7);
-    std::uniform_real_distribution<double> any(-1, 1);
-    maquette::FlyCamera fly(scene(up), {photo({1, 2, 3}, {1, 1, -0.5}, 0.9)});
-    const maq_pinhole_camera target = photo({4, -2, 1}, {-1, 0.3, 0.1}, 2);
-    for (int i = 0; i < 20000; ++i) {
-      fly.rotate(0.3 * any(random), 0.3 * any(random));
-      fly.move(any(random), any(random), any(random), 0.02, 0.1);
-      if (i % 1000 == 0) fly.fly_to(target, 1, 0);
-      if (i % 1000 == 0) fly.update(std::abs(any(random)));
-    }
-    const maq_pinhole_camera camera = fly.camera(640, 480);
-    expect_rotation(camera);
-    EXPECT_LE(std::abs(pitch_of(camera, up)), 89.001 * kDegree);
-  }
 }
 
 TEST(FlyCamera, WhatIsNotFiniteOrNoCameraDoesNothing) {
@@ -406,34 +345,6 @@ TEST(FlyCamera, ARotationThatIsATrifleOffIsMadeOne) {
   fly.fly_to(target, 0, 0);
   EXPECT_EQ(fly.photo_index(), 0);
   expect_rotation(fly.camera(640, 480));
-}
-
-TEST(FlyCamera, FliesInScenesFarOutTinyHugeOrWithoutASize) {
-  struct Case {
-    Vec3 low, high;
-    double diagonal;
-  };
-  const Case cases[] = {{{1e6, 1e6, 1e6}, {1e6 + 1, 1e6 + 2, 1e6 + 2}, 3},
-                        {{0, 0, 0}, {1e-3, 0, 0}, 1e-3},
-                        {{1e6, 0, 0}, {1e6 + 1e-3, 0, 0}, 1e-3},
-                        {{5, 5, 5}, {5, 5, 5}, 1},
-                        {{1e6, 0, 0}, {1e6, 0, 0}, 1},
-                        {{-1e9, 0, 0}, {1e9, 0, 0}, 2e9}};
-  for (const Case& one : cases) {
-    maquette::FlyCamera fly(scene({0, 0, 1}, one.low, one.high), {});
-    const maq_pinhole_camera before = fly.camera(640, 480);
-    expect_rotation(before);
-    const Vec3 middle = scaled(sum(one.low, one.high), 0.5);
-    const Vec3 pixel = seen(before, middle);
-    EXPECT_NEAR(pixel[0], 319.5, 1e-3);
-    EXPECT_NEAR(pixel[1], 239.5, 1e-3);
-    EXPECT_NEAR(pixel[2], one.diagonal, 1e-5 * one.diagonal);
-    fly.rotate(1, 0.5);
-    fly.move(0, 0, 1, 1, 0.5);
-    const maq_pinhole_camera after = fly.camera(640, 480);
-    expect_rotation(after);
-    EXPECT_NEAR(distance(position(before), position(after)), 0.5 * one.diagonal, 1e-5 * one.diagonal);
-  }
 }
 
 }  // namespace

@@ -97,17 +97,6 @@ TEST(LiveDensePose, PlaysAClipInRealTimeAgainAndAgain) {
   EXPECT_FALSE(people.live.status().has_ended);
 }
 
-TEST(LiveDensePose, APhotoIsMappedAgainWithOtherSettings) {
-  Live people;
-  people.live.open(kPhoto + "?size=64x48");
-  ASSERT_TRUE(people.until_ended());
-  ASSERT_EQ(people.frames(), 1u);
-  maq_densepose_config config = Live::config_of(kTinyBundle);
-  config.detail = MAQ_DENSEPOSE_DETAIL_PART;
-  people.live.set_model(config);
-  ASSERT_TRUE(people.until([&] { return people.frames() == 2; }));
-}
-
 TEST(LiveDensePose, LargePicturesOfFilesAreMadeSmaller) {
   maquette::LiveOptions options;
   options.max_side_px = 100;
@@ -117,20 +106,6 @@ TEST(LiveDensePose, LargePicturesOfFilesAreMadeSmaller) {
   ASSERT_EQ(people.frames(), 1u);
   EXPECT_LE(people.widths()[0], 100);
   EXPECT_GT(people.widths()[0], 30);
-}
-
-TEST(LiveDensePose, TheCameraIsLostAndComesBack) {
-  Live people;
-  people.live.open("image:" MAQ_TEST_MEDIA "/photo.jpg?size=64x48");  // the model is loaded before the camera is lost
-  ASSERT_TRUE(people.until_ended());
-  people.live.open("stub:pattern?fps=50&size=64x48&unplug=0.5s@20");
-  const std::vector<maq_pipeline_state> expected{MAQ_PIPELINE_OPENING, MAQ_PIPELINE_RUNNING, MAQ_PIPELINE_RECONNECTING,
-                                                 MAQ_PIPELINE_RUNNING};
-  ASSERT_TRUE(people.until([&] { return people.live.status().states == expected; }));
-  const uint64_t before = people.frames();
-  ASSERT_TRUE(people.until([&] { return people.frames() > before + 5; }));
-  EXPECT_EQ(people.live.status().problem, "");
-  EXPECT_FALSE(people.live.status().has_ended);
 }
 
 TEST(LiveDensePose, LateReportsOfTheSourceBeforeAreNotOfTheNewOne) {
@@ -165,18 +140,6 @@ TEST(LiveDensePose, EndsAfterAsManyResultsAsItWasAskedFor) {
   EXPECT_FALSE(people.live.status().has_failed);
 }
 
-TEST(LiveDensePose, ACameraThatStaysAwayEndsInASentence) {
-  Live people(as_fast_as_it_goes(0));
-  people.live.open("stub:pattern?fps=50&size=64x48&unplug@5");
-  ASSERT_TRUE(people.until_ended());
-  EXPECT_TRUE(people.live.status().has_failed);
-  EXPECT_FALSE(people.live.status().problem.empty());
-  // Another source goes on from there.
-  people.live.open("stub:pattern?frames=2&size=32x32");
-  ASSERT_TRUE(people.until([&] { return people.frames() > 0 && people.widths().back() == 32; }));
-  EXPECT_EQ(people.live.status().problem, "");
-}
-
 TEST(LiveDensePose, WhatCannotBeOpenedIsSaidAndReplaced) {
   Live people(as_fast_as_it_goes(0));
   people.live.open("image:/none.jpg", "stub:pattern?frames=3&size=32x32");
@@ -190,66 +153,6 @@ TEST(LiveDensePose, WhatCannotBeOpenedIsSaidAndReplaced) {
   EXPECT_NE(people.live.status().problem.find("/none.jpg does not exist"), std::string::npos);
 }
 
-TEST(LiveDensePose, ABadModelIsSaidAndAGoodOneGoesOn) {
-  Live people(as_fast_as_it_goes(0), "/no/bundle");
-  people.live.open("stub:pattern?frames=3&size=32x32");
-  ASSERT_TRUE(people.until([&] { return people.live.status().has_failed; }));
-  EXPECT_NE(people.live.status().problem.find("/no/bundle"), std::string::npos);
-  people.live.open("stub:pattern?frames=2&size=32x32");
-  EXPECT_EQ(people.live.status().uri, "stub:pattern?frames=2&size=32x32");
-  ASSERT_TRUE(people.until([&] { return people.live.status().has_failed; })) << "another source does not hide it";
-  people.live.set_model(Live::config_of(kTinyBundle));
-  ASSERT_TRUE(people.until([&] { return people.frames() == 2; }));
-}
-
-TEST(LiveDensePose, PausesAndGoesOn) {
-  Live people;
-  people.live.open("stub:pattern?fps=100&size=32x32");
-  ASSERT_TRUE(people.until([&] { return people.frames() > 3; }));
-  people.live.set_paused(true);
-  uint64_t frames = 0;
-  ASSERT_TRUE(people.until([&] {  // the frame in work may still come
-    frames = people.frames();
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    return people.frames() == frames;
-  }));
-  people.live.set_paused(false);
-  EXPECT_TRUE(people.until([&] { return people.frames() > frames + 3; }));
-}
-
-TEST(LiveDensePose, RecordsTheSource) {
-  const TempFolder folder;
-  Live people(as_fast_as_it_goes(0));
-  people.live.set_recording(folder.file("a.maqrec"));
-  people.live.open("stub:pattern?frames=6&size=64x48");
-  ASSERT_TRUE(people.until_ended());
-  people.live.open("rec:" + folder.file("a.maqrec"));
-  ASSERT_TRUE(people.until([&] { return people.frames() == 12; }));
-
-  people.live.set_recording("/no/folder/b.maqrec");
-  people.live.open("stub:pattern?frames=6&size=64x48");
-  ASSERT_TRUE(people.until([&] { return people.frames() == 18; })) << "frames go on without the recording";
-  EXPECT_NE(people.live.status().problem.find("/no/folder"), std::string::npos);
-}
-
-TEST(LiveDensePose, ARecordingIsCompleteWhenItCloses) {
-  const TempFolder folder;
-  std::string warned;
-  maq_context_config config = maquette::default_context_config();
-  config.log_callback = [](void* text, maq_log_level, const char* line) { *static_cast<std::string*>(text) += line; };
-  config.log_user_data = &warned;
-  {
-    Live people;
-    people.live.set_recording(folder.file("a.maqrec"));
-    people.live.open("stub:pattern?fps=50&size=64x48");
-    ASSERT_TRUE(people.until([&] { return people.frames() > 5; }));
-  }
-  const maquette::Context context(config);
-  maquette::Source played(context, "rec:" + folder.file("a.maqrec"));
-  EXPECT_GT(played.info().frame_count, 5);
-  EXPECT_EQ(warned, "") << "it has its index";
-}
-
 TEST(LiveDensePose, APathIsMadeAUriAndAUriStaysAsItIs) {
   const TempFolder folder;
   const std::string odd = folder.file("50%? a:b.jpg");
@@ -258,13 +161,6 @@ TEST(LiveDensePose, APathIsMadeAUriAndAUriStaysAsItIs) {
   EXPECT_EQ(maquette::source_uri("missing.jpg"), "file:missing.jpg");
   EXPECT_EQ(maquette::source_uri("stub:people?count=2"), "stub:people?count=2");
   EXPECT_EQ(maquette::source_uri("camera:"), "camera:");
-}
-
-TEST(LiveDensePose, LoadsNoModelBeforeThereIsASource) {
-  Live people({}, "/no/bundle");
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  EXPECT_EQ(people.live.status().problem, "");
-  EXPECT_FALSE(people.live.status().has_failed);
 }
 
 TEST(LiveDensePose, CallsReturnWhileItWorks) {

@@ -172,14 +172,6 @@ TEST_F(CommandLine, BadBundlesAreOneSentenceAndNothingIsWritten) {
                  "output boxes must have the shape [n, 6]");
 }
 
-TEST_F(CommandLine, AMissingRuntimeLibraryIsOneSentence) {
-  environment_ = "MAQ_ONNXRUNTIME_LIB=/no/such.so";
-  expect_failure("densepose two.png --out o", "/no/such.so");
-  const Outcome info = run("info");
-  EXPECT_EQ(info.exit_code, 1);
-  EXPECT_NE(info.out.find("ONNX Runtime   missing"), std::string::npos) << info.out;
-}
-
 TEST_F(CommandLine, ATruncatedClipKeepsItsWholeFramesAndNoOverlay) {
   const std::string whole = read_text(write_clip("clip.avi", 60));
   write_text(folder_.file("cut.avi"), whole.substr(0, whole.size() / 2));
@@ -372,22 +364,6 @@ TEST_F(CommandLine, InfoAndSourcesSayWhatThereIs) {
   for (const char* text : {"image:photo.jpg", "video:clip.mp4", "stub:people"}) {
     EXPECT_NE(sources.out.find(text), std::string::npos) << text;
   }
-}
-
-TEST_F(CommandLine, TooLittleMemoryIsASentence) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "sanitizers take terabytes of address space";
-#endif
-  int refused = 0;
-  for (const int mebibytes : {60, 80, 120, 200, 300}) {
-    const std::string limit = "ulimit -v " + std::to_string(mebibytes << 10) + " &&";
-    const Outcome result = run_program(folder_, limit, "densepose two.png --out o --threads 1");
-    if (result.exit_code == 0) continue;
-    EXPECT_EQ(result.exit_code, 1) << mebibytes << " MiB: " << result.err;
-    EXPECT_NE(result.err.find("not enough memory"), std::string::npos) << mebibytes << " MiB: " << result.err;
-    ++refused;
-  }
-  EXPECT_GT(refused, 0);
 }
 
 }  // namespace

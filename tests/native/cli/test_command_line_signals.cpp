@@ -100,27 +100,4 @@ TEST_F(CommandLineSignals, EndARecordingAsAWholeFile) {
   EXPECT_NE(read_text(folder_.file("out.txt")).find("To watch it: maquette play a.maqrec"), std::string::npos);
 }
 
-TEST_F(CommandLineSignals, BenchTakesItsOtherProgramWithIt) {
-  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGKILL}) {
-    SCOPED_TRACE(strsignal(number));
-    Running program(folder_, "bench 'stub:people?size=64x48' --seconds 600 --runs 1000000");
-    const std::string children =
-        "/proc/" + std::to_string(program.process()) + "/task/" + std::to_string(program.process()) + "/children";
-    pid_t other = 0;
-    ASSERT_TRUE(wait_until([&] {
-      const std::string text = read_text(children);
-      other = text.empty() ? 0 : std::stoi(text);
-      return other != 0 && read_text("/proc/" + std::to_string(other) + "/comm") == "maquette-bench\n";
-    }));
-    program.send(number);
-    const int status = program.wait_for_end();
-    EXPECT_EQ(WIFSIGNALED(status), number == SIGKILL) << status;
-    EXPECT_TRUE(wait_until([&] {
-      const std::string state = read_text("/proc/" + std::to_string(other) + "/stat");
-      return state.empty() ||
-             state.find(") Z ") != std::string::npos;  // a zombie: it has ended, and its parent has not asked yet
-    }));
-  }
-}
-
 }  // namespace

@@ -124,7 +124,8 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
   for (const char* name : {"square_ahead_001_sample_01.png", "square_ahead_002_sample_02.png"}) {
     EXPECT_NE(read_text(folder_.file(std::string("pictures/") + name)).find("maquette horizon_ns="), std::string::npos);
   }
-  for (const char* wrong : {"--samples 17", "--samples 2 --temperature -1", "--seed 3", "--method refined --top-k 3"}) {
+  for (const char* wrong :
+       {"--samples 17", "--samples 2 --temperature -1", "--seed 3", "--method refined --temperature 3"}) {
     EXPECT_EQ(run(std::string("square.avi --compare ") + wrong).exit_code, 2) << wrong;
   }
   expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");
@@ -162,66 +163,6 @@ TEST_F(PredictCommandLine, PlayConcealsAStallAndCountsWhatItMadeUp) {
   const Outcome plain = run_program(folder_, "MAQ_BUNDLE=", "play " + stub + " --json b.json");
   ASSERT_EQ(plain.exit_code, 0) << plain.err;
   EXPECT_FALSE(nlohmann::json::parse(read_text(folder_.file("b.json"))).contains("concealed"));
-}
-
-TEST_F(PredictCommandLine, BenchMeasuresEachStageOfPrediction) {
-  const std::string bundle = " --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle' --runs 2 --seconds 0 --warm-up 0 ";
-  const Outcome result = run_program(folder_, "MAQ_BUNDLE=", "bench --predict square.avi --json b.json" + bundle);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("4 samples take "), std::string::npos) << result.out;
-  const auto document = nlohmann::json::parse(read_text(folder_.file("b.json")));
-  EXPECT_EQ(document["schema"], "maquette-bench-prediction-1");
-  EXPECT_EQ(document["valid"], document["warnings"].empty());
-  EXPECT_TRUE(document["left_out"].empty()) << document["left_out"];
-  EXPECT_NEAR(document["settings"]["step_s"].get<double>(), 0.05, 1e-6);
-  EXPECT_GT(document["four_samples_times"].get<double>(), 0);
-  std::vector<std::string> names;
-  for (const auto& timed : document["cases"]) {
-    names.push_back(timed["name"]);
-    const bool is_sampled = timed.contains("samples");
-    EXPECT_EQ(timed["size_px"], is_sampled ? nlohmann::json({64, 64}) : nlohmann::json({160, 120})) << timed["name"];
-    EXPECT_GE(timed["runs"], 2);
-    double stages = 0;
-    for (const auto& [name, ms] : timed["ms"].items()) {
-      EXPECT_LE(ms["p50"], ms["p99"]) << name;
-      if (name != "frame") stages += ms["p50"].get<double>();
-    }
-    EXPECT_GT(stages, 0);
-    EXPECT_LT(stages, 1.5 * timed["ms"]["frame"]["p90"].get<double>()) << timed["name"];
-    for (const auto& warning : timed["warnings"]) {
-      EXPECT_EQ(warning.get<std::string>().find("nothing moved"), std::string::npos) << "the square does";
-    }
-  }
-  EXPECT_EQ(names.size(), 8u);
-  EXPECT_EQ(names.front(), "novelty");
-}
-
-TEST_F(PredictCommandLine, BenchSaysWhatItCannotMeasure) {
-  const auto bench = [&](const std::string& arguments) {
-    return run_program(folder_, "MAQ_BUNDLE=", "bench --predict --runs 1 --seconds 0 --warm-up 0 " + arguments);
-  };
-  const Outcome bigrams_alone = bench("square.avi --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'");
-  EXPECT_EQ(bigrams_alone.exit_code, 0) << bigrams_alone.err;
-  EXPECT_NE(bigrams_alone.out.find("No frame is sampled: "), std::string::npos) << bigrams_alone.out;
-  EXPECT_EQ(bigrams_alone.out.find("next, sampled"), std::string::npos) << bigrams_alone.out;
-  const cv::Mat grey(48, 64, CV_8UC3, cv::Scalar::all(90));
-  cv::VideoWriter clip(folder_.file("still.avi"), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, grey.size());
-  for (int i = 0; i < 16; ++i) clip.write(grey);
-  clip.release();
-  const Outcome still = bench("still.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
-  EXPECT_NE(still.out.find("nothing moved in 10 frames, so that no network ran"), std::string::npos) << still.out;
-  cv::imwrite(folder_.file("photo.png"), grey);
-  for (const auto& [arguments, text] : {std::pair{"photo.png", "photo has 1 of the 16 frames"},
-                                        {"square.avi square.avi", "one source"},
-                                        {"square.avi --threads measured", "--threads, 1 to 64"},
-                                        {"square.avi --bundle nowhere", "nowhere"}}) {
-    const Outcome result = bench(arguments);
-    EXPECT_EQ(result.exit_code, 1) << arguments;
-    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
-    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  }
-  EXPECT_EQ(bench("square.avi --key-frames 2").exit_code, 2) << "of dense pose";
-  EXPECT_NE(bench("--help").out.find("maquette bench --predict clip.mp4"), std::string::npos);
 }
 
 TEST_F(PredictCommandLine, WhatIsWrongIsOneSentence) {

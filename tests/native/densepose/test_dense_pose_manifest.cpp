@@ -61,15 +61,6 @@ TEST(DensePoseManifest, NeedsEachOfItsKeysWithTheRightType) {
   }
 }
 
-TEST(DensePoseManifest, NamesTheKeyOfAMistake) {
-  json changed = tiny();
-  changed["rpn"]["strides"][2] = "many";
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "\"rpn.strides[2]\" is not a whole number", [&] { read(changed); });
-  changed = tiny();
-  changed["box_head"].erase("nms_iou");
-  expect_error(MAQ_ERROR_BAD_BUNDLE, "\"box_head.nms_iou\" is missing", [&] { read(changed); });
-}
-
 TEST(DensePoseManifest, RefusesValuesOutOfRange) {
   const std::pair<const char*, json> wrong[] = {{"/input/std/1", 0},
                                                 {"/input/long_side_px", 100000},

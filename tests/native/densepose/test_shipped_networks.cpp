@@ -285,20 +285,6 @@ TEST_F(ShippedNetworks, TheOptimisedRpnAnswersAsTheUnoptimisedOne) {
   for (size_t i = 0; i < plain.size(); ++i) EXPECT_LE(relative_error(plain[i], optimised[i]), kMaxOptimisingError) << i;
 }
 
-// Threads share the outputs of a layer among them; no sum is split, so not one bit may change.
-TEST_F(ShippedNetworks, OneThreadAndTwoGiveTheSameResult) {
-  maq::DensePoseSettings two;
-  two.threads = 2;
-  const maq::DensePoseResult a = run(photo_), b = run(photo_, two);
-  ASSERT_EQ(a.people.size(), 1u);
-  ASSERT_EQ(b.people.size(), 1u);
-  EXPECT_EQ(a.people[0].score, b.people[0].score);
-  EXPECT_EQ(a.people[0].box.x1, b.people[0].box.x1);
-  EXPECT_EQ(a.planes.part, b.planes.part);
-  EXPECT_EQ(a.planes.u, b.planes.u);
-  EXPECT_EQ(a.planes.v, b.planes.v);
-}
-
 // The size of a batch chooses how matrices are cut into blocks, which may change the order of float sums: a few units
 // in the last place of the largest value.
 TEST_F(ShippedNetworks, ABatchOfPeopleIsAnsweredAsOneByOne) {
@@ -429,17 +415,6 @@ TEST_F(ShippedNetworks, NoiseShowsAPersonInAtMostOneFrameOfAHundred) {
   EXPECT_LE(frames_with_people, 1);
 }
 
-TEST_F(ShippedNetworks, FramesOfExtremeSizeGiveSaneResults) {
-  maq::DensePose densepose = make();
-  maq::DensePoseResult result;
-  for (const auto& [width, height] : {std::pair{1, 1}, {16, 16}, {31, 33}, {1, 4000}, {4000, 1}}) {
-    cv::Mat image;
-    cv::resize(photo_, image, cv::Size(width, height), 0, 0, cv::INTER_AREA);
-    densepose.run(view_of(image), result);
-    expect_sane(result, image);
-  }
-}
-
 // The planes of 4 bytes a pixel are the result; besides them nothing may grow with the frame.
 TEST_F(ShippedNetworks, AFrameOf33MegapixelsTakesLittleMoreMemoryThanItsResult) {
   cv::Mat image;
@@ -492,23 +467,6 @@ TEST_F(ShippedNetworks, PeopleHaveACropIfTheyAreSmallInTheNetworkOrLean) {
     return double(equal) / double(photo_.total());
   };
   EXPECT_GT(agreement(small), agreement(coarse) + 0.03) << "with a crop the small input labels as the large one";
-}
-
-TEST_F(ShippedNetworks, FramesOfExtremeSizeWithCropsGiveSaneResults) {
-  maq::DensePoseSettings settings;
-  settings.crops = maq::PersonCrops::kAll;
-  settings.key_frame_interval = 2;
-  maq::DensePose densepose = make(settings);
-  maq::DensePoseResult result;
-  for (const auto& [width, height] : {std::pair{1, 1}, {3, 700}, {1200, 4}, {37, 41}, {4000, 3000}}) {
-    cv::Mat image;
-    cv::resize(photo_, image, cv::Size(width, height), 0, 0, cv::INTER_AREA);
-    for (int frame = 0; frame < 2; ++frame) {
-      densepose.run(view_of(image), result);
-      expect_sane(result, image);
-    }
-  }
-  EXPECT_EQ(result.people.size(), 1u);
 }
 
 TEST_F(ShippedNetworks, ThePersonIsFoundWhenTruncatedByEachBorderAndWhenFillingTheFrame) {

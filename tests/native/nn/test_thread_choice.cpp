@@ -37,19 +37,6 @@ TEST(ThreadChoice, OfEqualTimesTheFewestThreadsAreTaken) {
   EXPECT_EQ(maq::choose_threads({0, 0}), 1) << "faster than the clock";
 }
 
-TEST(ThreadChoice, TwoPercentOfNoiseChangeNothing) {
-  for (int noise = 0; noise < 16; ++noise) {
-    const auto noisy = [noise](int i, double ms) { return ms * ((noise >> i & 1) != 0 ? 1.02 : 0.98); };
-    EXPECT_EQ(maq::choose_threads({noisy(0, 10), noisy(1, 10), noisy(2, 10), noisy(3, 10)}), 1) << noise;
-    EXPECT_EQ(maq::choose_threads({noisy(0, 10), noisy(1, 5.5), noisy(2, 4), noisy(3, 3.2)}), 4) << noise;
-  }
-}
-
-TEST(ThreadChoice, OneCoreIsOneThread) {
-  EXPECT_EQ(maq::choose_threads({7}), 1);
-  EXPECT_EQ(maq::choose_threads({}), 1);
-}
-
 TEST(ThreadChoice, WhatFailedIsNotTaken) {
   EXPECT_EQ(maq::choose_threads({10, kFailed, 5, kFailed}), 3);
   EXPECT_EQ(maq::choose_threads({kFailed, 5}), 2);
@@ -90,10 +77,6 @@ TEST(ThreadChoice, SlowOnesRunOnceEachAfterTheWarmUp) {
     };
   });
   EXPECT_EQ(runs, std::vector<int>(4, 2));
-}
-
-TEST(ThreadChoice, OfOneThreadNothingIsOpened) {
-  EXPECT_EQ(maq::measure_threads(1, [](int) -> maq::TimedRun { throw std::runtime_error("opened"); }), 1);
 }
 
 TEST(ThreadChoice, NumbersThatFailAreLeftOut) {

@@ -126,25 +126,6 @@ TEST_F(EdgesPipeline, ASourceWithoutDepthOrCalibrationFailsWithItsSentence) {
 }
 
 #if MAQ_HAS_DENSEPOSE
-TEST_F(EdgesPipeline, ModelsTakeTurns) {
-  maquette::Pipeline live = pipeline(true);
-  live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=200");
-  EXPECT_TRUE(maquette::curves_of(*live.next(kLongEnoughNs)));
-  maq_densepose_config people = maquette::default_densepose_config();
-  people.model.bundle_path = MAQ_TEST_DATA "/tiny_bundle";
-  people.model.threads = 1;
-  live.stop();
-  live.set_model(maquette::DensePoseModel(context, people));
-  live.set_source("stub:pattern?size=96x72&live=1&fps=200");
-  EXPECT_NE(maquette::densepose_of(*live.next(kLongEnoughNs)).get(), nullptr);
-  live.stop();
-  live.set_model(model(edges_config()));
-  live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=200");
-  const auto result = live.next(kLongEnoughNs);
-  EXPECT_TRUE(maquette::edges_of(*result));
-  EXPECT_EQ(maquette::densepose_of(*result).get(), nullptr);
-  EXPECT_FALSE(maquette::curves_of(*result));
-}
 #endif
 
 TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
@@ -181,54 +162,11 @@ TEST_F(EdgesPipeline, ThreadsThatWereMeasuredAreInTheLogAndTheStats) {
 TEST_F(EdgesPipeline, WrongArgumentsAreRefused) {
   const maq_edges_config edges = edges_config();
   maq_edges_curves_config curves = maquette::default_edges_curves_config();
-  const auto refused = [&](const maq_edges_config* config, const maq_edges_curves_config* wanted, const char* text) {
-    maq_model* made = nullptr;
-    EXPECT_EQ(maq_edges_model_create(context.get(), config, wanted, &made), MAQ_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(made, nullptr);
-    EXPECT_NE(std::strstr(maq_last_error(nullptr), text), nullptr) << maq_last_error(nullptr);
-  };
-  curves.min_votes = -1;
-  refused(&edges, &curves, "min_votes is -1");
-  maq_edges_config wrong = edges;
-  wrong.model.threads = 99;
-  refused(&wrong, nullptr, "threads is 99");
-  EXPECT_EQ(maq_edges_model_create(nullptr, &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-  EXPECT_EQ(maq_edges_model_create(context.get(), &edges, nullptr, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
-}
-
-TEST_F(EdgesPipeline, ABundleOfAnotherTaskFailsAndTheRightOneGoesOn) {
-  maquette::Pipeline live = pipeline(true);
-  live.set_model(model(edges_config(MAQ_TEST_DATA "/tiny_bundle")));
-  live.set_source(kStub);
-  EXPECT_NE(failure(live, MAQ_ERROR_UNSUPPORTED).find("densepose"), std::string::npos);
-  live.set_model(model(edges_config()));
-  EXPECT_TRUE(maquette::edges_of(*live.next(kLongEnoughNs)));
-}
-
-TEST_F(EdgesPipeline, BearsCallsFromManyThreads) {
-  maquette::Pipeline live = pipeline(true);
-  live.set_source("stub:solids?scene=box&size=96x72&live=1&fps=500");
-  std::atomic<bool> is_over{false};
-  std::vector<std::thread> threads;
-  for (int i = 0; i < 2; ++i) {
-    threads.emplace_back([&] {
-      while (!is_over) {
-        try {
-          const auto result = live.next(20000000);
-          const auto curves = result ? maquette::curves_of(*result) : std::nullopt;
-          if (curves) curves->snap_to_pixel(40, 30, 20);
-        } catch (const maquette::Error&) {  // in time, or while the model is loaded
-        }
-      }
-    });
-  }
-  for (int i = 0; i < 6; ++i) {
-    live.set_model(model(edges_config(), i % 2 == 0));
-    live.stats();
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  is_over = true;
-  for (std::thread& thread : threads) thread.join();
+  curves.min_length_px = -1;
+  maq_model* made = nullptr;
+  EXPECT_EQ(maq_edges_model_create(context.get(), &edges, &curves, &made), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(made, nullptr);
+  EXPECT_NE(std::strstr(maq_last_error(nullptr), "min_length_px is -1"), nullptr) << maq_last_error(nullptr);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 #include <random>
-#include <thread>
 
 #include "support/expect_error.h"
 #include "support/samples/moving_texture.h"
@@ -258,26 +257,6 @@ TEST(Novelty, AFrameThatCannotBeEncodedLeavesTheStreamAsItWas) {
                           two = other.push(texture_frame(2 * kUsual, time_ns));
   EXPECT_EQ(one.bits, two.bits);
   EXPECT_EQ(one.ratio, two.ratio);
-}
-
-TEST(Novelty, StreamsThatShareNetworksDoNotDependOnEachOther) {
-  std::vector<float> alone;
-  maq::Novelty novelty(tiny());
-  for (int i = 0; i < 30; ++i) alone.push_back(novelty.push(texture_frame(2 * i, i * kStep_ns)).bits);
-  std::vector<std::thread> threads;
-  for (int k = 0; k < 4; ++k) {
-    threads.emplace_back([&, k] {
-      maq::Novelty own(tiny());
-      for (int i = 0; i < 30; ++i) {
-        const bool is_same = k % 2 == 0;
-        const float bits =
-            own.push(is_same ? texture_frame(2 * i, i * kStep_ns) : noise_frame(unsigned(100 * k + i), i * kStep_ns))
-                .bits;
-        EXPECT_TRUE(!is_same || bits == alone[size_t(i)]) << k << " " << i;
-      }
-    });
-  }
-  for (std::thread& thread : threads) thread.join();
 }
 
 }  // namespace

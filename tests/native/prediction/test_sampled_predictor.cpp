@@ -142,16 +142,4 @@ TEST(SampledPredictor, WithoutMotionItIsTheLastFrame) {
   }
 }
 
-TEST(SampledPredictor, ACancelledSamplingGivesNothingAndTheNextOneRuns) {
-  maq::SampledPredictor predictor(sampler_networks(), {}, {});
-  for (int number = 0; number < 4; ++number) predictor.push(moving_nv12(number));
-  predictor.sample(1, 1, tiny_prediction::kFrame_ns);
-  predictor.cancel();
-  expect_error(MAQ_CANCELLED, "cancelled", [&] { predictor.sample(1, 1, tiny_prediction::kFrame_ns); });
-  std::vector<float> bits(256);
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "0 frames", [&] { predictor.copy_entropy(0, 1, bits.data()); });
-  EXPECT_NO_THROW(predictor.sample(1, 1, tiny_prediction::kFrame_ns));
-  EXPECT_NO_THROW(predictor.copy_entropy(0, 1, bits.data()));
-}
-
 }  // namespace

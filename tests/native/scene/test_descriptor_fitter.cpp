@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <thread>
 
 #include "scene/assembly/descriptor_fitter.h"
@@ -120,18 +119,6 @@ TEST_F(DescriptorFitter, TheOrderOfPhotosChangesRoundingAlone) {
   expect_the_same(built({0, 1, 2, 3}), built({3, 1, 0, 2}), 1e-5f);
 }
 
-TEST_F(DescriptorFitter, PhotosCanBeAddedAfterFinishing) {
-  maq::DescriptorFitter made = fitter();
-  add(made, 0);
-  add(made, 1);
-  const FittedPoints first = made.finish();
-  expect_the_same(first, built({0, 1}), 0);
-  add(made, 2);
-  add(made, 3);
-  expect_the_same(made.finish(), built({0, 1, 2, 3}), 0);
-  EXPECT_EQ(made.views(), 4u);
-}
-
 TEST_F(DescriptorFitter, FinishingInLessMemoryGivesTheSameAndAnEmptyFitter) {
   maq::DescriptorFitter made = fitter();
   add(made, 0);
@@ -203,99 +190,6 @@ TEST_F(DescriptorFitter, ACancelledPhotoChangesNothing) {
   }
 }
 
-TEST_F(DescriptorFitter, ACancelBeforeAPhotoIsOfThatPhotoAlone) {
-  maq::DescriptorFitter made = fitter();
-  made.cancel();
-  EXPECT_FALSE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
-  EXPECT_TRUE(made.add_view(photos_[0].frame.image, nullptr, photos_[0].camera).has_value());
-}
-
-TEST_F(DescriptorFitter, InvalidCloudsAreRefused) {
-  const auto refused = [&](maq_status status, const char* text, const maq::PointCloud& cloud) {
-    expect_error(status, text, [&] { maq::DescriptorFitter(cloud, capture_.up, *networks_, {}); });
-  };
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "has no points", {});
-  for (const float value : {std::nanf(""), INFINITY, -INFINITY}) {
-    maq::PointCloud cloud = capture_.cloud;
-    cloud.y[7] = value;
-    refused(MAQ_ERROR_INVALID_ARGUMENT, "Point 7 of the cloud", cloud);
-  }
-  maq::PointCloud uneven = capture_.cloud;
-  uneven.z.pop_back();
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "as many of each", uneven);
-  maq::PointCloud nowhere = capture_.cloud;
-  nowhere.origin[1] = INFINITY;
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "origin", nowhere);
-}
-
-TEST_F(DescriptorFitter, OptionsOutOfRangeAreRefused) {
-  const auto refused = [&](const char* text, auto change) {
-    maq::FittingOptions options;
-    std::array<double, 3> up = capture_.up;
-    change(options, up);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text,
-                 [&] { maq::DescriptorFitter(capture_.cloud, up, *networks_, options); });
-  };
-  refused("has no direction", [](auto&, auto& up) { up = {0, 0, 0}; });
-  refused("has no direction", [](auto&, auto& up) { up = {0, std::nan(""), 1}; });
-  refused("visibility scale is 0", [](auto& options, auto&) { options.visibility_scale = 0; });
-  refused("visibility scale is 2", [](auto& options, auto&) { options.visibility_scale = 2; });
-  refused("visibility scale is nan", [](auto& options, auto&) { options.visibility_scale = std::nan(""); });
-  refused("nearest point is -1", [](auto& options, auto&) { options.near = -1; });
-  refused("Threads are 0", [](auto& options, auto&) { options.threads = 0; });
-}
-
-TEST_F(DescriptorFitter, PhotosThatDoNotFitAreRefusedAndChangeNothing) {
-  maq::DescriptorFitter made = fitter();
-  add(made, 0);
-  const Photo& photo = photos_[1];
-  const auto refused = [&](const char* text, const maq::ImageView& image, const maq::PinholeCamera& camera) {
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { made.add_view(image, nullptr, camera); });
-  };
-  maq::PinholeCamera camera = photo.camera;
-  camera.width_px += 1;
-  refused("72 x 56 pixels, but its camera is for 73 x 56", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.centre[0] = std::nan("");
-  refused("not finite", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.rotation[0] = 3;
-  refused("rotation", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.cx_px = 1e12;
-  refused("cannot be right", photo.frame.image, camera);
-  camera = photo.camera;
-  camera.fy_px = 1e-12;
-  refused("cannot be right", photo.frame.image, camera);
-  maq::ImageView grey = photo.frame.image;
-  grey.format = MAQ_PIXEL_GREY8;
-  refused("must be BGR", grey, photo.camera);
-  expect_the_same(made.finish(), built({0}), 0);
-}
-
-TEST_F(DescriptorFitter, PhotosOverTheLimitOfTheNetworksAreRefused) {
-  maq::Frame large;
-  maq::PinholeCamera camera = maq::resized(photos_[0].camera, 4000, 3000);
-  large.allocate_bgr(4000, 3000);
-  maq::DescriptorFitter made = fitter();
-  expect_error(MAQ_ERROR_IMAGE_SIZE, "over the limit", [&] { made.add_view(large.image, nullptr, camera); });
-  EXPECT_EQ(made.views(), 0u);
-}
-
-TEST_F(DescriptorFitter, APhotoThatSeesNothingIsNotCounted) {
-  maq::DescriptorFitter made = fitter();
-  maq::PinholeCamera away = photos_[0].camera;
-  for (size_t i = 0; i < 3; ++i) {  // rotated by half a circle about its vertical
-    away.rotation[i] = -away.rotation[i];
-    away.rotation[6 + i] = -away.rotation[6 + i];
-  }
-  EXPECT_EQ(made.add_view(photos_[0].frame.image, nullptr, away).value(), 0u);
-  EXPECT_EQ(made.views(), 0u);
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "None of the photos sees a point", [&] { made.finish(); });
-  add(made, 1);
-  expect_the_same(made.finish(), built({1}), 0);
-}
-
 TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoRotation) {
   maq::PinholeCamera down = photos_[0].camera;
   down.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
@@ -305,18 +199,6 @@ TEST_F(DescriptorFitter, UpAlongTheViewIsLikeNoRotation) {
   EXPECT_GT(along.add_view(photos_[0].frame.image, nullptr, down).value(), 50u);
   across.add_view(photos_[0].frame.image, nullptr, down);
   expect_the_same(along.finish(), across.finish(), 0);
-}
-
-TEST_F(DescriptorFitter, TheLimitOfMemoryIsKept) {
-  maq::FittingOptions options = as_in_the_reference();
-  options.max_bytes = capture_.cloud.count() * 4 - 1;
-  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "over the limit", [&] { fitter(options); });
-  options.max_bytes = capture_.cloud.count() * 4 + built({0}).count() * 340;
-  maq::DescriptorFitter made = fitter(options);
-  add(made, 0);
-  expect_error(MAQ_ERROR_OUT_OF_MEMORY, "seen points", [&] { add(made, 2); });
-  add(made, 0);
-  expect_the_same(made.finish(), built({0, 0}, options), 0);
 }
 
 // A wall of points that fills the photos of cameras side by side: each photo sees other ones.
@@ -380,23 +262,6 @@ TEST_F(DescriptorFitter, AMillionSeenPointsTakeLessThan450MB) {
   EXPECT_EQ(seen, kAcross * kDown);
   std::printf("%.0f MiB for %zu points\n", grown_mib, seen);
   EXPECT_LT(grown_mib * 1048576, 450e6);
-}
-
-TEST_F(DescriptorFitter, TwentyMillionPointsOfWhichFewAreSeenTakeLittleMoreThanTheCloud) {
-  maq::PinholeCamera camera;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 100;
-  maq::Frame photo;
-  std::fill_n(photo.allocate_bgr(640, 480), 3 * 640 * 480, uint8_t(90));
-  size_t seen = 0;
-  const double grown_mib = peak_memory_growth_mib([&] {
-    maq::DescriptorFitter made(wall(5000, 4000), {0, -1, 0}, *networks_, {});
-    seen = made.add_view(photo.image, nullptr, camera).value();
-  });
-  EXPECT_EQ(seen, 640u * 480u);
-  std::printf("%.0f MiB\n", grown_mib);
-  EXPECT_LT(grown_mib, 20e6 * (12 + 4) / 1048576 + 200);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "scene/gravity_alignment.h"
-#include "support/expect_error.h"
 #include "support/samples/synthetic_scene.h"
 
 namespace {
@@ -37,21 +36,6 @@ TEST(PinholeCamera, GravityAlignmentIsContinuousWhereUpIsAlongTheAxis) {
     for (size_t i = 0; i < 9; ++i) EXPECT_NEAR(rotation[i], before[i], 0.02) << tilt;
     before = rotation;
   }
-}
-
-TEST(PinholeCamera, InvalidCamerasAreRefused) {
-  const auto refuses = [](const char* text, auto change) {
-    PinholeCamera camera = camera_of(64, 48, 60);
-    change(camera);
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, text, [&] { maq::check_camera(camera, "Camera 3"); });
-  };
-  refuses("not finite", [](PinholeCamera& camera) { camera.cx_px = NAN; });
-  refuses("not finite", [](PinholeCamera& camera) { camera.centre[1] = INFINITY; });
-  refuses("must be positive", [](PinholeCamera& camera) { camera.fx_px = 0; });
-  refuses("right angles", [](PinholeCamera& camera) { camera.rotation[1] = 0.5; });
-  refuses("mirrors", [](PinholeCamera& camera) { camera.rotation[8] = -1; });
-  PinholeCamera camera = camera_of(0, 48, 60);
-  expect_error(MAQ_ERROR_IMAGE_SIZE, "Camera 3 is 0 x 48", [&] { maq::check_camera(camera, "Camera 3"); });
 }
 
 }  // namespace

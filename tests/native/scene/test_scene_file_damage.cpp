@@ -111,17 +111,6 @@ TEST(SceneFileDamage, EveryByteThatIsMissingIsNoticed) {
   EXPECT_TRUE(is_refused(path));
 }
 
-TEST(SceneFileDamage, EveryByteThatIsMissingInMemoryIsNoticed) {
-  TempFolder folder;
-  const std::string bytes = small_file(folder);
-  open_and_use_memory(bytes);
-  for (size_t left = bytes.size(); left-- > 0;) {
-    ASSERT_TRUE(is_refused_from_memory(bytes.substr(0, left))) << left << " of " << bytes.size();
-  }
-  EXPECT_TRUE(is_refused_from_memory(bytes + '\0'));
-  EXPECT_TRUE(is_refused_from_memory(bytes + std::string(64, '\0')));
-}
-
 TEST(SceneFileDamage, EveryBitThatIsFlippedInMemoryIsNoticed) {
   TempFolder folder;
   std::string bytes = small_file(folder);
@@ -133,27 +122,6 @@ TEST(SceneFileDamage, EveryBitThatIsFlippedInMemoryIsNoticed) {
     }
   }
   open_and_use_memory(bytes);
-}
-
-TEST(SceneFileDamage, EveryBitThatIsFlippedIsNoticed) {
-  TempFolder folder;
-  std::string bytes = small_file(folder);
-  const std::string path = folder.file("small.maqs");
-  FILE* file = std::fopen(path.c_str(), "r+b");
-  std::setvbuf(file, nullptr, _IONBF, 0);
-  const auto put = [&](size_t at, int byte) {
-    std::fseek(file, long(at), SEEK_SET);
-    std::fputc(byte, file);
-  };
-  for (size_t at = 0; at < bytes.size(); ++at) {
-    for (int bit = 0; bit < 8; ++bit) {
-      put(at, uint8_t(bytes[at]) ^ (1 << bit));
-      ASSERT_TRUE(is_refused(path)) << "bit " << bit << " of byte " << at;
-    }
-    put(at, uint8_t(bytes[at]));
-  }
-  std::fclose(file);
-  open_and_use(path);
 }
 
 struct Attack {

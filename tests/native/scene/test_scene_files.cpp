@@ -158,15 +158,6 @@ TEST(SceneFiles, AProcessThatDiesWhileItWritesLeavesTheOldFile) {
   expect_same(maq::open_scene_file(path), large);
 }
 
-TEST(SceneFiles, WhereNoneCanBeWrittenIsOneSentence) {
-  TempFolder folder;
-  const Scene scene = make_scene(ball_over_a_floor(10), {});
-  std::filesystem::create_directory(folder.file("folder"));
-  expect_error(MAQ_ERROR_UNWRITABLE, "is not a file", [&] { write_scene_file(scene, folder.file("folder")); });
-  expect_error(MAQ_ERROR_UNWRITABLE, "cannot be made",
-               [&] { write_scene_file(scene, folder.file("not there/a.maqs")); });
-}
-
 TEST(SceneFiles, WhatIsNoSceneIsOneSentence) {
   TempFolder folder;
   const auto open = [&](const std::string& name) { maq::open_scene_file(folder.file(name)); };

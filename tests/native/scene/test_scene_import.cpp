@@ -325,15 +325,6 @@ TEST_F(SceneImport, WhatCannotBeUsedIsDroppedAndCountedWithItsReason) {
   std::filesystem::remove(folder_.path().parent_path() / "up.png");
 }
 
-TEST_F(SceneImport, PhotosToCompareWithAreHeldOut) {
-  json document = transforms();
-  document["test_filenames"] = {document["frames"][1]["file_path"], "images/of_nobody.png"};
-  write_transforms(document);
-  const Capture capture = open();
-  ASSERT_GE(capture.views.size(), 2u);
-  for (size_t i = 0; i < capture.views.size(); ++i) EXPECT_EQ(capture.views[i].is_held_out, i == 1) << i;
-}
-
 TEST_F(SceneImport, FramesThatCannotBeUsedAreDroppedAndCounted) {
   json document = transforms();
   json mirrored = frame("images/b.png"), scaled = frame("images/b.png"), zero = frame("images/c.png");
@@ -491,17 +482,6 @@ TEST_F(SceneImport, ViewsAreLoadedUndistorted) {
       EXPECT_NEAR(pixel[1], 10 * at->row_px, 1) << view.name;
     }
   }
-}
-
-TEST_F(SceneImport, APhotoThatChangedSinceIsASentence) {
-  const Capture capture = open_colmap(MadeCapture());
-  cv::imwrite(folder_.file("images/a.png"), cv::Mat(10, 10, CV_8UC3, cv::Scalar()));
-  std::filesystem::remove(folder_.file("images/b.png"));
-  maq::Frame picture;
-  std::vector<uint8_t> valid;
-  expect_error(MAQ_ERROR_UNREADABLE, "10 x 10 pixels, but was 32 x 24",
-               [&] { maq::load_view(capture.views[0], picture, valid); });
-  expect_error(MAQ_ERROR_NOT_FOUND, "does not exist", [&] { maq::load_view(capture.views[1], picture, valid); });
 }
 
 TEST_F(SceneImport, TheCloudsOriginIsAmidTheCamerasSoThatPositionsFarAwayAreExact) {

@@ -110,24 +110,6 @@ TEST_F(SceneNetworks, AreToldApartByTheirFiles) {
   EXPECT_EQ(hex, maq::sha256_hex(digests.data(), digests.size()));
 }
 
-TEST_F(SceneNetworks, ADenseposeBundleIsNone) {
-  expect_error(MAQ_ERROR_UNSUPPORTED, "is for the task densepose, but one for scenes is needed", [] {
-    maq::SceneNetworks(tiny_scene::runtime(), maq::read_bundle(std::string(MAQ_TEST_DATA) + "/tiny_bundle"),
-                       maq::SessionSettings{});
-  });
-}
-
-TEST_F(SceneNetworks, EachFileIsVerified) {
-  for (const char* name : {"extractor.onnx", "refiner.onnx", "basis.bin"}) {
-    const std::string bytes = read_text(folder_.file(name));
-    std::string changed = bytes;
-    changed[changed.size() / 2] ^= 1;
-    write_text(folder_.file(name), changed);
-    expect_error(MAQ_ERROR_BAD_BUNDLE, std::string(name) + " has SHA-256", [&] { open(); });
-    write_text(folder_.file(name), bytes);
-  }
-}
-
 TEST_F(SceneNetworks, ABasisOfAnotherSizeOrWithoutNumbersIsRefused) {
   const std::string bytes = read_text(folder_.file("basis.bin"));
   replace("basis.bin", bytes.substr(4));

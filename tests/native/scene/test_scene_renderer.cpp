@@ -239,51 +239,6 @@ TEST(SceneRenderer, EmptyPartsLeftOutChangeNothingThatIsCovered) {
   }
 }
 
-TEST(SceneRenderer, OverABackgroundItIsBlendedByAlpha) {
-  const Scene scene = packed(synthetic_points(300), maq::CoefficientFormat::kFloat32);
-  RenderOptions over;
-  over.background = std::array<uint8_t, 3>{255, 0, 100};
-  const PinholeCamera camera = camera_of(160, 112, 100);
-  const Rendered plain = render(scene, camera), found = render(scene, camera, over);
-  EXPECT_EQ(found.alpha, plain.alpha);
-  size_t partly = 0;
-  for (size_t i = 0; i < plain.alpha.size(); ++i) {
-    const double alpha = plain.alpha[i] / 255.0;
-    // Where it is less sure, the scene's own background is in `plain`.
-    if (plain.alpha[i] < 64) continue;
-    partly += alpha < 1 ? 1 : 0;
-    for (size_t c = 0; c < 3; ++c) {
-      ASSERT_NEAR(found.bgr[3 * i + c], alpha * plain.bgr[3 * i + c] + (1 - alpha) * (*over.background)[c], 0.51);
-    }
-  }
-  EXPECT_GT(partly, 100u);
-}
-
-TEST(SceneRenderer, WhereNothingIsSeenThereIsBackgroundAndNoNetworkRuns) {
-  const Scene scene = packed(synthetic_points(1000), maq::CoefficientFormat::kInt8);
-  RenderOptions options;
-  options.background = std::array<uint8_t, 3>{1, 2, 3};
-  for (const double roll : {0.0, 0.5}) {
-    PinholeCamera camera = camera_of(50, 40, 60);
-    camera.rotation = rotation_of(std::cos(roll), std::sin(roll), 0, 0);
-    camera.centre = {0, 0, 100};
-    const Rendered picture = render(scene, camera, options);
-    expect_sound(picture, camera);
-    EXPECT_EQ(picture.counts.refined_pixels, 0u);
-    EXPECT_EQ(picture.counts.shaded_points, 0u);
-    for (size_t i = 0; i < picture.bgr.size(); ++i) ASSERT_EQ(picture.bgr[i], 1 + i % 3);
-    EXPECT_EQ(std::count(picture.alpha.begin(), picture.alpha.end(), 0), 50 * 40);
-    EXPECT_EQ(std::count(picture.depth.begin(), picture.depth.end(), 0.0f), 50 * 40);
-
-    // Without one of the app's own it is the scene's.
-    Scene other = scene;
-    other.background = {0.2f, 0.4f, 1.0f};
-    const Rendered plain = render(other, camera);
-    const std::array<uint8_t, 3> expected = {255, 102, 51};
-    for (size_t i = 0; i < plain.bgr.size(); ++i) ASSERT_EQ(plain.bgr[i], expected[i % 3]);
-  }
-}
-
 TEST(SceneRenderer, DepthIsThatOfThePointsAlsoWhenRotated) {
   // A wall across the axis, 2 away, wider than the image.
   maq::FittedPoints points = synthetic_points(20000);
@@ -381,29 +336,6 @@ TEST(SceneRenderer, ScenesInAnyUnitLookTheSame) {
       EXPECT_GE(psnr(found.bgr, expected.bgr), 55);
     }
   }
-}
-
-TEST(SceneRenderer, WhatCannotBeRenderedIsASentence) {
-  const Scene scene = packed(synthetic_points(10), maq::CoefficientFormat::kInt8);
-  const auto refuses = [&](maq_status status, const char* text, auto change) {
-    PinholeCamera camera = camera_of(64, 48, 60);
-    change(camera);
-    expect_error(status, text, [&] { render(scene, camera); });
-  };
-  const auto wrong = MAQ_ERROR_INVALID_ARGUMENT;
-  refuses(wrong, "not finite", [](PinholeCamera& camera) { camera.fx_px = NAN; });
-  refuses(wrong, "right angles", [](PinholeCamera& camera) { camera.rotation[1] = 0.5; });
-  refuses(wrong, "pixels away from its picture", [](PinholeCamera& camera) { camera.cx_px = 1e9; });
-  refuses(wrong, "differ by a factor over 1000", [](PinholeCamera& camera) { camera.fx_px *= 1e5; });
-  refuses(MAQ_ERROR_IMAGE_SIZE, "is 0 x 48", [](PinholeCamera& camera) { camera.width_px = 0; });
-  refuses(MAQ_ERROR_IMAGE_SIZE, "over the limit of 8388608",
-          [](PinholeCamera& camera) { camera.width_px = camera.height_px = 4000; });
-  RenderOptions options;
-  options.threads = 0;
-  expect_error(wrong, "Threads are 0, but must be 1 to 64", [&] { SceneRenderer(scene, networks(), options); });
-  options.threads = 1;
-  options.near = INFINITY;
-  expect_error(wrong, "must be a finite number", [&] { SceneRenderer(scene, networks(), options); });
 }
 
 }  // namespace

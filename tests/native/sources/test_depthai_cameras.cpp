@@ -541,57 +541,6 @@ TEST_F(DepthaiCameras, FramesThatComeAfterTheCloseAreDropped) {
   EXPECT_EQ(reason, "it is closed");
 }
 
-TEST_F(DepthaiCameras, TwoHundredTimesOpenedNothingIsLeft) {
-  for (int i = 0; i < 200; ++i) {
-    const auto opened = camera();
-    const int64_t time = FakeDepthAi::now_ns();
-    fake_.send_colour(fake_.colour(1, i, time));
-    if (i % 3 != 0) fake_.send_depth(fake_.depth(1, i, time));
-    if (i % 2 == 0) take(*opened, i % 3 == 0 ? 0 : 1000);  // held until the end
-    fake_.send_colour(fake_.colour(1, i + 1, time + kPeriod));
-    if (i % 4 == 0) opened->close();
-  }
-  EXPECT_EQ(fake_.sessions(), 0);
-  EXPECT_EQ(fake_.opened(), 200);
-  EXPECT_EQ(fake_.frames_alive(), 0);
-  for (int i = 0; i < 20; ++i) source(settings());
-}
-
-TEST_F(DepthaiCameras, FramesAreTakenAndGivenBackByOtherThreadsWhileTheCameraComesAndGoes) {
-  maq::SourceSettings asked = settings();
-  asked.queue_length = 2;
-  const auto live = source(asked);
-  std::atomic<bool> done{false};
-  std::thread colours([&] {
-    for (int i = 0; !done; ++i) {
-      if (i % 200 == 100) fake_.unplug();
-      if (i % 200 == 150) fake_.plug();
-      fake_.send_colour(fake_.colour(uint8_t(i), i));
-      std::this_thread::sleep_for(2ms);
-    }
-  });
-  std::thread depths([&] {
-    for (int i = 0; !done; ++i) {
-      fake_.send_depth(fake_.depth(uint16_t(i), i));
-      std::this_thread::sleep_for(2ms);
-    }
-  });
-  uint64_t last = 0;
-  int with_depth = 0;
-  for (int taken = 0; taken < 150; ++taken) {
-    maq::Frame frame;
-    ASSERT_EQ(live->next(5 * kSecond, frame), NextFrame::kFrame);
-    EXPECT_TRUE(taken == 0 || frame.sequence > last);
-    last = frame.sequence;
-    with_depth += frame.depth.width_px > 0;
-    std::thread([moved = std::move(frame)]() mutable { moved.lease.reset(); }).join();
-  }
-  EXPECT_GT(with_depth, 75);
-  done = true;
-  colours.join();
-  depths.join();
-}
-
 TEST_F(DepthaiCameras, CalibrationIsThatOfTheAgreedSize) {
   fake_.lens = maq::DepthAiLens{501, 502, 31, 25, {1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0}, true};
   auto opened = camera({64, 48, 30, false});

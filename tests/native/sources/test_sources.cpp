@@ -177,34 +177,4 @@ TEST(Sources, WithoutACameraTheFirstOneIsNotFound) {
   expect_error(MAQ_ERROR_NOT_FOUND, "No camera was found", [] { maq::open_source("camera:?size=640x480"); });
 }
 
-TEST(Sources, UnknownThingsAreNamedWithWhatThereIs) {
-  expect_error(MAQ_ERROR_UNSUPPORTED, "\"rtsp:\" is not a kind of source", [] { maq::open_source("rtsp:host"); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "stub:pattern and stub:solids", [] { maq::open_source("stub:cats"); });
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "names nothing", [] { maq::open_source("image:"); });
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "Option colour", [] { maq::open_source("stub:people?colour=red"); });
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "count=31", [] { maq::open_source("stub:people?count=31"); });
-  expect_error(MAQ_ERROR_NOT_FOUND, "/none.jpg does not exist", [] { maq::open_source("image:/none.jpg"); });
-}
-
-TEST(Sources, ThePoolIsBoundedAndReusesItsFrames) {
-  maq::BoundedPool<maq::Frame> pool(2, "frames");
-  auto first = pool.acquire();
-  auto second = pool.acquire();
-  expect_error(MAQ_ERROR_POOL_EMPTY, "All 2 frames", [&] { pool.acquire(); });
-  const uint8_t* memory = first->allocate_bgr(16, 16);
-  first.reset();
-  const auto third = pool.acquire();
-  EXPECT_EQ(third->storage.data(), memory);
-}
-
-TEST(Sources, FramesOutliveTheirPool) {
-  maq::BoundedPool<int>::Pooled kept;
-  {
-    maq::BoundedPool<int> pool(1, "numbers");
-    kept = pool.acquire();
-  }
-  *kept = 5;
-  EXPECT_EQ(*kept, 5);
-}
-
 }  // namespace

@@ -22,7 +22,7 @@ def test_every_native_test_that_the_list_of_extreme_cases_names_exists():
     listed = Path("tests/native/README.md").read_text().split("## Extreme cases")[1]
     tests = {
         (suite, name)
-        for path in Path("tests/native").glob("*/test_*.cpp")
+        for path in Path("tests/native").rglob("test_*.cpp")
         for suite, name in re.findall(r"^TEST(?:_F)?\((\w+), (\w+)\)", path.read_text(), re.MULTILINE)
     }
     named, suite = [], ""

@@ -1,7 +1,6 @@
 // Captures through the C API: what is in a folder, its photos, and folders in which something is wrong.
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "support/samples/api_tiny_scene.h"
@@ -17,14 +16,6 @@ class ApiCaptures : public ::testing::Test {
   std::string copy() const { return folder_.file("capture"); }
   nlohmann::json transforms() const { return nlohmann::json::parse(read_text(copy() + "/transforms.json")); }
   void write(const nlohmann::json& document) const { write_text(copy() + "/transforms.json", document.dump()); }
-  void write_cloud(const std::vector<float>& places) const {
-    const std::string head = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                             std::to_string(places.size() / 3) +
-                             "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-    write_text(copy() + "/cloud.ply",
-               head + std::string(reinterpret_cast<const char*>(places.data()), places.size() * sizeof(float)));
-  }
-
   void expect_refused(maq_status status, const std::string& text) const {
     maq_capture* capture = nullptr;
     EXPECT_EQ(maq_capture_open(context_.get(), copy().c_str(), &capture), status) << maq_last_error(context_.get());
@@ -102,66 +93,6 @@ TEST_F(ApiCaptures, WhatCannotBeUsedIsToldWithItsReason) {
   EXPECT_NE(std::string(capture.drop(0).reason).find("(first: images/4.png)"), std::string::npos);
 }
 
-TEST_F(ApiCaptures, PointsThatAreNotFiniteAreDroppedAndACloudOfThemIsRefused) {
-  std::vector<float> places = api_tiny_scene::capture_places();
-  const size_t count = places.size() / 3;
-  places[0] = std::numeric_limits<float>::quiet_NaN();
-  places[4] = std::numeric_limits<float>::infinity();
-  write_cloud(places);
-  {
-    const maquette::Capture capture(context_, copy());
-    EXPECT_EQ(capture.info().point_count, count - 2);
-    expect_dropped(capture, "points whose position is not finite", 2);
-  }
-  write_cloud(std::vector<float>(30, std::numeric_limits<float>::quiet_NaN()));
-  expect_refused(MAQ_ERROR_UNREADABLE, "point");
-  write_cloud({});
-  expect_refused(MAQ_ERROR_UNREADABLE, "point");
-}
-
-TEST_F(ApiCaptures, CamerasWithoutImagesAndImagesWithoutCameras) {
-  std::filesystem::remove_all(copy() + "/images");
-  expect_refused(MAQ_ERROR_UNREADABLE, "5 photos that are not in their folder");
-  nlohmann::json document = transforms();
-  document["frames"] = nlohmann::json::array();
-  write(document);
-  expect_refused(MAQ_ERROR_UNREADABLE, "no photo that can be used");
-}
-
-TEST_F(ApiCaptures, PhotosOfAnotherShapeThanTheirCameraAreDropped) {
-  nlohmann::json document = transforms();
-  document["w"] = 56;
-  document["h"] = 72;
-  write(document);
-  expect_refused(MAQ_ERROR_UNREADABLE, "shape");
-  document = transforms();
-  document["w"] = 72;
-  document["h"] = 56;
-  document["frames"][1]["w"] = 100;
-  write(document);
-  const maquette::Capture capture(context_, copy());
-  EXPECT_EQ(capture.info().view_count, 4u);
-  EXPECT_EQ(capture.info().drop_count, 1u);
-}
-
-TEST_F(ApiCaptures, FoldersWithoutACaptureAreAStatus) {
-  maq_capture* capture = nullptr;
-  EXPECT_EQ(maq_capture_open(context_.get(), "/no/such/folder", &capture), MAQ_ERROR_NOT_FOUND);
-  EXPECT_NE(std::string(maq_last_error(context_.get())).find("/no/such/folder"), std::string::npos);
-  EXPECT_EQ(maq_capture_open(context_.get(), folder_.path().c_str(), &capture), MAQ_ERROR_NOT_FOUND);
-  std::filesystem::remove(copy() + "/cloud.ply");
-  expect_refused(MAQ_ERROR_NOT_FOUND, "cloud");
-  write_text(copy() + "/transforms.json", "{ not json");
-  expect_refused(MAQ_ERROR_UNREADABLE, "transforms.json");
-}
-
-TEST_F(ApiCaptures, CameraModelsThatAreNotReadAreAStatus) {
-  nlohmann::json document = transforms();
-  document["camera_model"] = "EQUIRECTANGULAR";
-  write(document);
-  expect_refused(MAQ_ERROR_UNSUPPORTED, "EQUIRECTANGULAR");
-}
-
 TEST_F(ApiCaptures, APhotoThatIsGoneOrDamagedSinceIsAStatusOfTheCapture) {
   const maquette::Capture capture(context_, copy());
   maq_frame* frame = nullptr;
@@ -171,20 +102,6 @@ TEST_F(ApiCaptures, APhotoThatIsGoneOrDamagedSinceIsAStatusOfTheCapture) {
   write_text(copy() + "/images/1.png", "no picture");
   EXPECT_EQ(maq_capture_load_view(capture.get(), 1, &frame), MAQ_ERROR_UNREADABLE);
   EXPECT_EQ(frame, nullptr);
-}
-
-TEST_F(ApiCaptures, IndicesOutOfRangeAreRefused) {
-  const maquette::Capture capture(context_, kCapture);
-  maq_frame* frame = nullptr;
-  maq_capture_view view{};
-  view.struct_size = sizeof view;
-  maq_capture_drop drop{};
-  drop.struct_size = sizeof drop;
-  for (const uint32_t index : {5u, 0xFFFFFFFFu}) {
-    EXPECT_EQ(maq_capture_get_view(capture.get(), index, &view), MAQ_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(maq_capture_load_view(capture.get(), index, &frame), MAQ_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(maq_capture_get_drop(capture.get(), index, &drop), MAQ_ERROR_INVALID_ARGUMENT);
-  }
 }
 
 }  // namespace

@@ -223,28 +223,6 @@ TEST_F(ApiSceneBuilding, CloudsThatAreNoneAreRefused) {
   expect_refused(cloud_of(places_), build_config(), MAQ_ERROR_INVALID_ARGUMENT, "Point 1000");
 }
 
-TEST_F(ApiSceneBuilding, SettingsOutOfRangeAreRefusedByName) {
-  const auto expect = [&](const std::string& name, auto change) {
-    maq_scene_build_config config = build_config();
-    change(config);
-    expect_refused(cloud_of(places_), config, MAQ_ERROR_INVALID_ARGUMENT, name);
-  };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect("config.model.threads", [](auto& config) { config.model.threads = -1; });
-  expect("config.model.threads", [](auto& config) { config.model.threads = 65; });
-  expect("config.long_side_px", [](auto& config) { config.long_side_px = -2; });
-  expect("config.long_side_px", [](auto& config) { config.long_side_px = 16385; });
-  expect("config.coefficient_bits is 9", [](auto& config) { config.coefficient_bits = 9; });
-  expect("config.min_variation", [=](auto& config) { config.min_variation = nan; });
-  expect("config.min_variation is -0.5", [](auto& config) { config.min_variation = -0.5; });
-  expect("visibility scale is 1.01", [](auto& config) { config.visibility_scale = 1.01; });
-  expect("visibility scale", [=](auto& config) { config.visibility_scale = nan; });
-  expect("nearest point", [](auto& config) { config.near_depth = -1; });
-  expect("nearest point", [=](auto& config) { config.near_depth = nan; });
-  expect("config.use_held_out", [](auto& config) { config.use_held_out = 2; });
-  expect("config.struct_size is 5", [](auto& config) { config.struct_size = 5; });
-}
-
 TEST_F(ApiSceneBuilding, CoefficientsAreOfTheBitsAskedForAndMayAllVaryOrNone) {
   const maquette::Capture capture(context_, kCapture);
   for (const int32_t bits : {8, 16, 32}) {
@@ -415,5 +393,28 @@ TEST_F(ApiSceneBuilding, ABuilderOutlivesWhatItWasMadeOf) {
   builder.reset();
   EXPECT_GT(scene.info().point_count, 300u);
 }
+
+TEST_F(ApiSceneBuilding, WithoutAConfigTheInstalledBundleIsUsed) {
+  const maq_point_cloud cloud = cloud_of(places_);
+  maq_scene_builder* builder = nullptr;
+  ASSERT_EQ(maq_scene_builder_create(context_.get(), nullptr, &cloud, &builder), MAQ_OK) << maq_last_error(nullptr);
+  maq_scene_builder_destroy(builder);
+}
+
+TEST_F(ApiSceneBuilding, FoldersAndPathsThatAreEmptyAreAStatus) {
+  const maquette::Capture opened(context_, kCapture);
+  maq_capture* capture = nullptr;
+  EXPECT_EQ(maq_capture_open(context_.get(), "", &capture), MAQ_ERROR_NOT_FOUND);
+  maq_scene* scene = nullptr;
+  EXPECT_EQ(maq_scene_open(context_.get(), "", &scene), MAQ_ERROR_NOT_FOUND);
+  maq_scene_build_config config = build_config();
+  config.model.bundle_path = "";
+  EXPECT_EQ(maq_scene_build(context_.get(), &config, opened.get(), &scene), MAQ_ERROR_NOT_FOUND);
+}
+
+// Layouts that apps rely on.
+static_assert(sizeof(void*) != 8 ||
+                  (sizeof(maq_pinhole_camera) == 208 && offsetof(maq_pinhole_camera, rotation) == 112),
+              "");
 
 }  // namespace

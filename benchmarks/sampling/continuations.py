@@ -39,7 +39,7 @@ def predicted(name: str, **settings: object) -> Method:
 
 
 def sampled(samples: int, bundle: Path, **settings: float) -> Method:
-    """Returns a sampling method. settings: temperature, top_k."""
+    """Returns a sampling method. settings: temperature."""
     predictor = maquette.Predictor("sampled", bundle_path=bundle, threads=1, seed=SEED, **settings)
 
     def go_on(frames: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray]:

@@ -50,7 +50,7 @@ class Predictor(NativeObject):
 
     def sample(self, sample_count: int, frame_count: int, step_s: float) -> None:
         """Samples `sample_count` (1 to 16) possible futures of `frame_count` (1 to 64) frames, `step_s` (at most 0.125)
-        seconds apart. The method is "sampled"; temperature, top_k and seed apply. Results depend only on the seed and
+        seconds apart. The method is "sampled"; temperature and seed apply. Results depend only on the seed and
         the pushed frames. They are valid until the next push, predict or sample. Raises MaquetteError."""
         native().call("maq_predictor_sample", self.handle, sample_count, frame_count, step_s)
 

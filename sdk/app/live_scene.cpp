@@ -43,8 +43,7 @@ double compare(const RgbaImage& one, const RgbaImage& other, RgbaImage& error) {
 
 LiveScene::LiveScene(const Context& context, const std::string& bundle_path, int threads,
                      std::function<void()> on_change)
-    : context_(context), bundle_path_(bundle_path), on_change_(std::move(on_change)) {
-  request_.threads = threads;
+    : context_(context), bundle_path_(bundle_path), threads_(threads), on_change_(std::move(on_change)) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -60,7 +59,7 @@ void LiveScene::open(const std::string& path, const std::string& capture_folder)
   auto state = std::make_shared<LiveSceneState>();
   if (!path.empty()) *state = {LiveSceneState::kOpening, 0, path, "Opening " + path + ".", {}, {}, {}};
   const std::lock_guard<std::mutex> lock(mutex_);
-  request_ = {path, capture_folder, request_.threads, -1, {}, true, false, false};
+  request_ = {path, capture_folder, -1, {}, true, false, false};
   state_ = std::move(state);
   images_.take();
   wake_.notify_one();
@@ -69,13 +68,6 @@ void LiveScene::open(const std::string& path, const std::string& capture_folder)
 void LiveScene::render(const maq_pinhole_camera& camera, int photo_index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   request_.camera = camera, request_.photo_index = photo_index, request_.renders = true;
-  wake_.notify_one();
-}
-
-void LiveScene::set_threads(int threads) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  request_.renders |= request_.camera && threads != request_.threads;
-  request_.threads = threads;
   wake_.notify_one();
 }
 
@@ -130,7 +122,7 @@ void LiveScene::load(const Request& request) {
   }
   if (builds) {
     maq_scene_build_config config = default_scene_build_config();
-    config.model.bundle_path = bundle_path_.c_str(), config.model.threads = request.threads;
+    config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads_;
     config.progress_user_data = this;
     config.progress_callback = [](void* self, double done, const char* stage) -> int32_t {
       return static_cast<LiveScene*>(self)->update(
@@ -140,7 +132,7 @@ void LiveScene::load(const Request& request) {
   } else {
     scene_.emplace(context_, request.path);
   }
-  make_renderer(request.threads);
+  make_renderer();
   LiveSceneState ready{LiveSceneState::kReady, 1, request.path, missing_, scene_->info(), {}, {}};
   for (uint32_t i = 0; capture_ && i < capture_->info().view_count; ++i) {
     const maq_capture_view view = capture_->view(i);
@@ -150,15 +142,13 @@ void LiveScene::load(const Request& request) {
   update([&](LiveSceneState& state) { state = ready; });
 }
 
-void LiveScene::make_renderer(int threads) {
-  threads_ = threads;
+void LiveScene::make_renderer() {
   maq_scene_renderer_config config = default_scene_renderer_config();
-  config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads;
+  config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads_;
   renderer_ = SceneRenderer(context_, config, *scene_);
 }
 
 void LiveScene::render(const Request& request) {
-  if (threads_ != request.threads) make_renderer(request.threads);
   LiveSceneImage& image = images_.back();
   image.camera = within_limits(*request.camera);
   const Image rendered = renderer_->run(image.camera);

@@ -56,7 +56,6 @@ class LiveScene {  // all calls by the thread that takes the images
   // Renders an image once there is a scene, 1280 x 960 at most; the latest call wins. `photo_index`: whose camera, or
   // -1.
   void render(const maq_pinhole_camera& camera, int photo_index);
-  void set_threads(int threads);  // renders the latest image again
   std::shared_ptr<const LiveSceneState> state() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return state_;
@@ -67,20 +66,21 @@ class LiveScene {  // all calls by the thread that takes the images
  private:
   struct Request {
     std::string path, capture_folder;
-    int threads = 0, photo_index = -1;
+    int photo_index = -1;
     std::optional<maq_pinhole_camera> camera;
     bool opens = false, renders = false, ends = false;
   };
 
   void run();
   void load(const Request& request);
-  void make_renderer(int threads);
+  void make_renderer();
   void render(const Request& request);
   void add_photo(const Request& request, LiveSceneImage& image);
   bool update(const std::function<void(LiveSceneState&)>& change) noexcept;
 
   const Context& context_;
   const std::string bundle_path_;
+  const int threads_;
   const std::function<void()> on_change_;
   mutable std::mutex mutex_;  // of the request and the state
   std::condition_variable wake_;
@@ -94,7 +94,6 @@ class LiveScene {  // all calls by the thread that takes the images
   std::string missing_;  // the state's text while nothing fails
   RgbaImage photo_;      // the latest, and its index and size
   std::array<int, 3> photo_key_{};
-  int threads_ = 0;
   uint64_t image_count_ = 0;
   std::thread thread_;
 };

@@ -24,16 +24,8 @@ typedef struct maq_edges_curves maq_edges_curves;
 /* Settings of the curve search. The defaults suit all cameras and scenes, because lengths are in pixels. */
 typedef struct maq_edges_curves_config {
   uint32_t struct_size;
-  float vote_radius_px;       /* pixels nearer than this to an edge vote for its position, up to 16; 0 (default): 4 */
-  float min_votes;            /* votes that an edge needs, up to 100; 1 is the sum of all votes from one side of an
-                                 edge; 0 (default): 0.35 */
-  float flying_pixel_band_px; /* half-width of the band of mixed (flying) pixels along an edge, up to 32;
-                                 0 (default): 3 */
-  float fit_band_px;     /* width of the band beyond flying_pixel_band_px to which surfaces are fitted, 2 to 64. It is
-                            three times as wide where depth is noisy. 0 (default): 8 */
-  float split_angle_deg; /* a curve that turns by more than this at one point is split, up to 180; 0 (default): 15 */
-  float min_length_px;   /* shorter curves are dropped, 4 to 1e6; 0 (default): 10 */
-  int32_t skip_boxes;    /* 1: do not search for boxes; default 0 */
+  float min_length_px; /* shorter curves are dropped, 4 to 1e6; 0 (default): 10 */
+  int32_t skip_boxes;  /* 1: do not search for boxes; default 0 */
 } maq_edges_curves_config;
 
 typedef enum maq_edges_curve_type {

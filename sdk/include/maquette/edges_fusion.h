@@ -30,7 +30,6 @@ typedef struct maq_edges_fusion_config {
   uint32_t struct_size;
   int32_t threads;     /* 1 to 64; 0 (default): the machine's large cores, at most 4 */
   double cell_m;       /* approximate distance between points; 0 (default): the footprint of the median pixel */
-  uint64_t max_pixels; /* limit for all views, six bytes a pixel; 0 (default): 33,554,432 */
   uint64_t max_points; /* limit for points, about 240 bytes each at the peak; 0 (default): 4,000,000 */
   int32_t min_views;   /* with three or more views, drop curves that fewer views have seen, 1 to 1000; 0 (default): 2 */
   maq_edges_fusion_progress_callback progress_callback; /* may be NULL */
@@ -77,7 +76,7 @@ MAQ_API void maq_edges_fusion_destroy(maq_edges_fusion* fusion);
  * The order of views does not matter. A view without known depth is counted and changes nothing. On failure the fusion
  * stays unchanged.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (a camera of another size, an invalid rotation, another eps_r),
- * MAQ_ERROR_UNSUPPORTED (more than max_pixels). Blocks for some milliseconds. */
+ * MAQ_ERROR_UNSUPPORTED (more than 33,554,432 pixels in all views). Blocks for some milliseconds. */
 MAQ_API maq_status maq_edges_fusion_add_view(maq_edges_fusion* fusion, const maq_edges_result* result,
                                              const maq_pinhole_camera* camera);
 

@@ -42,7 +42,6 @@ typedef struct maq_predictor_config {
   uint32_t frame_pool_size;    /* predicted frames the app may hold at once, 1 to 64; 0 (default): 4 */
   float temperature; /* SAMPLED: 0 (default) takes the likeliest code; 1 samples by the probabilities; larger values
                         vary more */
-  uint32_t top_k;    /* SAMPLED: samples only from this many likeliest codes; 0 (default): from all */
   uint64_t seed;     /* SAMPLED: equal seeds give equal frames on one processor; default 0 */
   const maq_predictor* shared_with; /* shares the networks of this predictor, which has the same method, REFINED or
                                        SAMPLED. `model` then sets only the threads for pixels. The two predictors run
@@ -105,7 +104,7 @@ MAQ_API maq_status maq_predictor_push(maq_predictor* predictor, const maq_frame*
 MAQ_API maq_status maq_predictor_predict(maq_predictor* predictor, double ahead_s, maq_frame** frame);
 
 /* Samples `sample_count` (1 to 16) possible futures of `frame_count` (1 to 64) frames, `step_s` seconds apart: above 0,
- * at most 0.125. Steps above 0.1 count as 0.1, the longest in training. The config's temperature, top_k and seed apply.
+ * at most 0.125. Steps above 0.1 count as 0.1, the longest in training. The config's temperature and seed apply.
  * Each sample is autoregressive: its frames follow from its own earlier frames. Results depend only on the seed and the
  * pushed frames, not on the counts. While nothing moves, all samples equal the last frame. Samples are valid until the
  * next push, predict, sample or reset.

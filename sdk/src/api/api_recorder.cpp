@@ -28,6 +28,7 @@ maq_status maq_recorder_create(maq_context* context, const char* path, const maq
     require_range("config.keep_predicted", config.keep_predicted, 0, 1);
     RecordingInfo info;
     if (source != nullptr) {
+      require_argument(source, "source");
       info.source = source->uri;
       info.fps = source->source->info().fps;
       if (source->source->intrinsics() != nullptr) info.intrinsics = *source->source->intrinsics();

@@ -90,10 +90,4 @@ void check_head_prior(const HeadPrior& prior) {
   check_fault(landmarks_fault(prior.landmarks));
 }
 
-const NamedPoint* find_place(const HeadPrior& prior, const std::string& name) {
-  const auto found = std::find_if(prior.landmarks.begin(), prior.landmarks.end(),
-                                  [&](const NamedPoint& landmark) { return landmark.name == name; });
-  return found == prior.landmarks.end() ? nullptr : &*found;
-}
-
 }  // namespace maq::head

@@ -73,7 +73,4 @@ std::string landmarks_fault(const std::vector<NamedPoint>& landmarks);
 // to kMaxLandmarkName bytes and no two alike.
 void check_head_prior(const HeadPrior& prior);
 
-// Null without a landmark of this name.
-const NamedPoint* find_place(const HeadPrior& prior, const std::string& name);
-
 }  // namespace maq::head

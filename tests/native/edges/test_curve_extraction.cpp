@@ -364,8 +364,8 @@ TEST(CurveExtraction, BadInputIsNamed) {
   field.intrinsics.fx_px = 0;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "focal lengths", [&] { extractor.extract(field); });
   maq::CurveOptions options;
-  options.tolerance_r = NAN;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "tolerance_r", [&] { CurveExtractor other(options); });
+  options.min_length_px = NAN;
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "min_length_px", [&] { CurveExtractor other(options); });
 }
 
 }  // namespace

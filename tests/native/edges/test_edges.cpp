@@ -249,38 +249,4 @@ TEST(Edges, TheScaleOfTheSceneIsWithoutEffect) {
   }
 }
 
-TEST(Edges, WhatIsNoDepthOrNoCameraOfItIsRefused) {
-  const auto edges = tiny_edges::edges();
-  const std::vector<uint8_t> bytes(8 * 6 * 4, 1);
-  const maq::ImageView picture = maq::packed_view(MAQ_PIXEL_BGR8, 8, 6, bytes.data()),
-                       depth = maq::packed_view(MAQ_PIXEL_DEPTH16, 8, 6, bytes.data());
-  maq::EdgesResult result;
-  const auto refused = [&](maq_status status, const char* text, const maq::ImageView& image, maq::Intrinsics camera) {
-    expect_error(status, text, [&] { edges->run(image, camera, result); });
-  };
-  refused(MAQ_ERROR_UNSUPPORTED, "an image (BGR8)", picture, camera_of(8, 6));
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "camera of 6 x 8 pixels", depth, camera_of(6, 8));
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-  for (const double focal_px : {0.0, -100.0, nan, infinity, 1e-9, 1e12}) {
-    for (double maq::Intrinsics::*focal : {&maq::Intrinsics::fx_px, &maq::Intrinsics::fy_px}) {
-      maq::Intrinsics camera = camera_of(8, 6);
-      camera.*focal = focal_px;
-      refused(MAQ_ERROR_INVALID_ARGUMENT, focal == &maq::Intrinsics::fx_px ? "fx_px" : "fy_px", depth, camera);
-    }
-  }
-  maq::Intrinsics camera = camera_of(8, 6);
-  camera.cx_px = nan;
-  refused(MAQ_ERROR_INVALID_ARGUMENT, "principal point", depth, camera);
-  edges->run(depth, camera_of(8, 6), result);
-  EXPECT_EQ(result.stats.known_pixels, 48) << "what was refused changes nothing";
-}
-
-TEST(Edges, ACancelEndsTheNextRunAndNoOther) {
-  const auto edges = tiny_edges::edges();
-  const std::vector<float> depth = noise(40, 40, 7);
-  edges->cancel();
-  expect_error(MAQ_CANCELLED, "cancelled", [&] { run(*edges, depth, 40, 40); });
-  EXPECT_GT(run(*edges, depth, 40, 40).stats.network_pixels, 0);
-}
-
 }  // namespace

@@ -1,7 +1,6 @@
 // Fused fields: as the reference in float64, whatever the order of views; extreme poses, plates and numbers of views.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -268,32 +267,6 @@ TEST(FieldFusion, FaultsOfAViewAreNamed) {
   other = view;
   other.field.depth_m.pop_back();
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "planes", [&] { fusion.add_view(other.field, other.camera); });
-  FusionOptions options;
-  options.cell_m = NAN;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "cell_m", [&] { FieldFusion{options}; });
-}
-
-TEST(FieldFusion, ACancelledFusionEndsAndTheNextRuns) {
-  FieldFusion fusion;
-  const PosedField view = wall(camera_at({0, 0, 0}));
-  fusion.add_view(view.field, view.camera);
-  maq::WorkerThreads threads(1);
-  std::atomic<bool> is_cancelled{false};
-  FusedField found;
-  float last = -1;
-  expect_error(MAQ_CANCELLED, "cancelled", [&] {
-    fusion.fuse(
-        threads, is_cancelled, [&](float) { is_cancelled = true; }, found);
-  });
-  is_cancelled = false;
-  fusion.fuse(
-      threads, is_cancelled,
-      [&](float share) {
-        EXPECT_GE(share, last);
-        last = share;
-      },
-      found);
-  EXPECT_EQ(last, 1);
 }
 
 }  // namespace

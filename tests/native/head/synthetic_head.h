@@ -114,7 +114,7 @@ inline FieldWeights train_mean_head() {
     gradient.set_zero();
     engine.backward(
         workspace,
-        {by[0].data(), {by[1].data(), by[2].data(), by[3].data()}, {by[4].data(), by[5].data(), by[6].data()}, {}},
+        {by[0].data(), {by[1].data(), by[2].data(), by[3].data()}, {by[4].data(), by[5].data(), by[6].data()}},
         maq::head::WeightGradient::kAll, &gradient);
     const float rate = 0.01f * std::min(1.0f, 1.05f - float(step) / kSteps);
     for (size_t i = 0; i < weights.values().size(); ++i) {

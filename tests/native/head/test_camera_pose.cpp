@@ -317,17 +317,6 @@ TEST(CameraPose, OptionsThatMeanNothingAreRefusedInASentence) {
   }
 }
 
-TEST(CameraPose, TheSamePointsGiveTheSameBits) {
-  Random random(13);
-  const HeadCamera camera = camera_at(5, 700, {0.2, 0.3, 0.1});
-  std::vector<Correspondence> points = head_points(camera, 500, 1, random);
-  spoil(points, 0.4, random);
-  const CameraPose a = find_camera_pose(points, prior_of(camera, 1.2, 0.3));
-  const CameraPose b = find_camera_pose(points, prior_of(camera, 1.2, 0.3));
-  EXPECT_EQ(a.camera.head_to_camera.rotation, b.camera.head_to_camera.rotation);
-  EXPECT_EQ(a.covariance, b.covariance);
-}
-
 // Gauss-Newton's matrix is the product of the residuals' derivatives, here by differences.
 TEST(CameraPose, TheInformationIsThatOfFiniteDifferences) {
   using namespace maq::head;

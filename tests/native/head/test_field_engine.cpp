@@ -99,7 +99,7 @@ void expect_values(const FieldWeights& weights, FieldIsa isa, size_t count) {
 void expect_gradients(const FieldWeights& weights, size_t count, bool has_surface) {
   Batch batch(count);
   FieldValueGradient given = batch.gradient();
-  if (!has_surface) given = {given.distance, {}, {}, {}};
+  if (!has_surface) given = {given.distance, {}, {}};
   const Gradients expected = gradients(weights, batch.points, has_surface, [&](size_t i) { return batch.seeds(i); });
   for (const FieldIsa isa : supported_field_isas()) {
     SCOPED_TRACE(std::string(field_isa_name(isa)) + ", width " + std::to_string(weights.shape().width) + ", points " +
@@ -329,50 +329,38 @@ TEST(FieldEngine, PointsThatAreNotFiniteHaveNoPartInGradients) {
     const FieldShape shape = shape_of_width(48);
     const FieldWeights weights = random_weights(shape, 21);
     const FieldEngine engine = engine_of(weights, isa);
-    Columns by = random_columns(70, 22, 1.0f), by_rgb = random_columns(70, 23, 1.0f),
-            by_normal = random_columns(70, 24, 1.0f);
+    Columns by = random_columns(70, 22, 1.0f), by_rgb = random_columns(70, 23, 1.0f);
     const auto run = [&](Batch& batch, FieldWeights& sum, Columns& by_points) {
       FieldWorkspace workspace;
-      FieldValues values = batch.values();
-      Columns normals = by_points;
-      values.normal = as_planes(normals);
-      engine.forward(as_points(batch.points), workspace, values);
+      engine.forward(as_points(batch.points), workspace, batch.values());
       size_t left_out = 0;
       for (int round = 0; round < 2; ++round) {  // the second sees what the first left
-        left_out = engine.backward(workspace, {by[0].data(), as_const_planes(by_rgb), {}, as_const_planes(by_normal)},
-                                   WeightGradient::kAll, &sum, as_planes(by_points));
+        left_out = engine.backward(workspace, {by[0].data(), as_const_planes(by_rgb), {}}, WeightGradient::kAll, &sum,
+                                   as_planes(by_points));
       }
       return left_out;
     };
     // The same with these points' gradients of 0.
     const size_t points[] = {5, 25, 45, 64, 65, 66};
-    Columns kept_by = by, kept_rgb = by_rgb, kept_normal = by_normal;
+    Columns kept_by = by, kept_rgb = by_rgb;
     for (const size_t i : points) {
       by[0][i] = 0;
-      for (size_t c = 0; c < 3; ++c) by_rgb[c][i] = by_normal[c][i] = 0;
+      for (size_t c = 0; c < 3; ++c) by_rgb[c][i] = 0;
     }
     Batch good(70);
     FieldWeights expected(shape), sum(shape);
     Columns expected_points = by, by_points = by;
     EXPECT_EQ(run(good, expected, expected_points), 0u);
-    by = kept_by, by_rgb = kept_rgb, by_normal = kept_normal;
+    by = kept_by, by_rgb = kept_rgb;
     Batch batch(70);
     for (size_t k = 0; k < 3; ++k) batch.points[k][points[k]] = bad[k];
     by[0][points[3]] = bad[0];
     by_rgb[1][points[4]] = bad[1];
-    by_normal[2][points[5]] = bad[2];
+    by_rgb[2][points[5]] = bad[2];
     EXPECT_EQ(run(batch, sum, by_points), 6u);
     EXPECT_EQ(sum.values(), expected.values());
     EXPECT_EQ(by_points, expected_points);
     for (const size_t i : points) EXPECT_EQ(by_points[0][i], 0.0f);
-  }
-}
-
-TEST(FieldEngine, InfinityIsNanFromTheEncodingOn) {
-  for (const FieldIsa isa : supported_field_isas()) {
-    AlignedFloats points(3 * kFieldBlock, INFINITY), encoding(9 * kFieldBlock);
-    field_kernels(isa).encode(points.data(), 1, encoding.data());
-    for (const float value : encoding) EXPECT_TRUE(std::isnan(value));
   }
 }
 
@@ -417,9 +405,6 @@ TEST(FieldEngine, WhatWasNotKeptIsSaid) {
   expect_error(MAQ_ERROR_INTERNAL, "was kept", backward);
   engine.forward(as_points(batch.points), workspace, {batch.distance.data(), {}, {}});
   expect_error(MAQ_ERROR_INTERNAL, "not run forwards", backward);
-  expect_error(MAQ_ERROR_INTERNAL, "No normals", [&] {
-    engine.backward(workspace, {nullptr, {}, {}, as_const_planes(batch.by_rgb)}, WeightGradient::kAll, &gradient);
-  });
   engine.forward(as_points(batch.points), workspace, batch.values());
   expect_error(MAQ_ERROR_INTERNAL, "another shape",
                [&] { engine.backward(workspace, batch.gradient(), WeightGradient::kAll, &other); });

@@ -63,7 +63,7 @@ TEST(FieldParts, GradientsHaveTheSameBitsWhateverTheThreads) {
         std::vector<float> distance(part.end - begin);
         engine.forward({&columns[0][begin], &columns[1][begin], &columns[2][begin], distance.size()}, part.workspace,
                        {distance.data(), {}, {}, {}});
-        engine.backward(part.workspace, {&by_distance[begin], {}, {}, {}}, WeightGradient::kAll, &part.gradient);
+        engine.backward(part.workspace, {&by_distance[begin], {}, {}}, WeightGradient::kAll, &part.gradient);
       });
     }
     parts.add_gradients(sum);

@@ -155,18 +155,5 @@ TEST_F(HeadBundles, WithADamagedFileAreRefusedAlsoWhereItsDigestIsRight) {
   expect_refused(manifest_, MAQ_ERROR_BAD_BUNDLE, "is missing");
 }
 
-TEST_F(HeadBundles, InMemoryAreTheSame) {
-  const std::string files[] = {"manifest.json", "encoder.onnx", "prior.maqp"};
-  std::vector<std::string> bytes;
-  std::vector<maq::NamedBuffer> buffers;
-  bytes.reserve(std::size(files));
-  for (const std::string& name : files) {
-    bytes.push_back(read_text(folder_.file(name)));
-    buffers.push_back({name, bytes.back().data(), bytes.back().size()});
-  }
-  const maq::head::HeadBundle bundle(maq::read_bundle(buffers));
-  EXPECT_EQ(bundle.prior.landmarks.size(), 2u);
-}
-
 }  // namespace
 }  // namespace head_bundles

@@ -230,24 +230,6 @@ TEST(HeadFiles, OfHeadsWithAFaultAreNotWritten) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(HeadFiles, AFullDiskLeavesTheOldFile) {
-  const TempFolder folder;
-  const std::string path = folder.file("a.maqh");
-  write_head_file(example(), path);
-  const std::string old = read_text(path);
-  StoredHead other = example();
-  other.sharpness = 10;
-  for (const rlim_t max : {rlim_t(0), rlim_t(100), rlim_t(old.size() - 1)}) {
-    const FileSizeLimit limit(max);
-    expect_error(MAQ_ERROR_UNWRITABLE, "a.maqh", [&] { write_head_file(other, path); });
-  }
-  EXPECT_EQ(read_text(path), old);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
-  write_head_file(other, path);
-  EXPECT_EQ(read_head_file(path).sharpness, 10);
-  expect_error(MAQ_ERROR_UNWRITABLE, "none", [&] { write_head_file(other, folder.file("none/a.maqh")); });
-}
-
 TEST(HeadFiles, CutOrChangedAtAnyBitAreRefused) {
   checked_file_damage::expect_all_damage_noticed(bytes_of(example()), MAQ_ERROR_UNREADABLE, open_and_use);
 }

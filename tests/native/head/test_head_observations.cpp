@@ -27,8 +27,6 @@ TEST(HeadObservations, CellsLieWhereTheCropDoesAndNormalsTurnWithIt) {
   // Cell (0, 1): the crop's pixel centre (5.5, 1.5), continuous (6, 2).
   EXPECT_NEAR(seen.cells[1].x_px, 100 - 4 - 0.5, 1e-12);
   EXPECT_NEAR(seen.cells[1].y_px, 10 + 12 - 0.5, 1e-12);
-  EXPECT_NEAR(seen.cells[1].normal.y, 0.6, 1e-7);
-  EXPECT_NEAR(seen.cells[1].normal.z, -0.8, 1e-7);
   EXPECT_NEAR(seen.cells[1].sigma_dm, 0.05, 1e-7);
   EXPECT_NEAR(seen.cells[1].matte, 1 / (1 + std::exp(-2.0)), 1e-7);
   const maq::Point back = seen.photo_to_crop({96, 22});

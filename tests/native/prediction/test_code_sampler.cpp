@@ -91,47 +91,27 @@ TEST(CodeSampler, AtInfiniteTemperatureAllAreEquallyLikely) {
   }
 }
 
-TEST(CodeSampler, AtTemperature0AndTopK1ItIsTheLikeliestTheLowestOfEquals) {
+TEST(CodeSampler, AtTemperature0ItIsTheLikeliestTheLowestOfEquals) {
   const std::vector<float> logits{0, 3, -1, 3, 2.9f};
   for (uint64_t seed = 0; seed < 50; ++seed) {
-    EXPECT_EQ(sampled({0, 0, seed}, logits), 1);
-    EXPECT_EQ(sampled({1, 1, seed}, logits), 1);
-    EXPECT_EQ(sampled({kForEver, 1, seed}, logits), 1);
-    EXPECT_EQ(sampled({1e-6f, 0, seed}, {0, 2, 3, 2.9f}), 2);
-    EXPECT_EQ(sampled({0, 0, seed}, std::vector<float>(7, 1.0f)), 0);
+    EXPECT_EQ(sampled({0, seed}, logits), 1);
+    EXPECT_EQ(sampled({1e-6f, seed}, {0, 2, 3, 2.9f}), 2);
+    EXPECT_EQ(sampled({0, seed}, std::vector<float>(7, 1.0f)), 0);
   }
-}
-
-TEST(CodeSampler, TopKKeepsTheLikeliestTheLowestOfEqualsFirst) {
-  const std::vector<float> logits{1, 2, 1, 3, 1, 0};
-  for (const size_t top_k : {2u, 3u, 4u, 5u}) {
-    maq::SamplingSettings settings;
-    settings.top_k = top_k;
-    const std::vector<int> counts = counts_of(settings, logits, 20000);
-    std::vector<float> kept(6, -kForEver);
-    size_t left = top_k;
-    for (const size_t code : {3, 1, 0, 2, 4, 5}) {
-      if (left > 0) kept[code] = logits[code];
-      left -= left > 0 ? 1 : 0;
-    }
-    EXPECT_LT(chi_square(counts, softmax(kept, 1)), 5 + 5 * 4.0) << top_k;
-  }
-  EXPECT_EQ(counts_of({1, 6, 5}, logits, 1000), counts_of({1, 0, 5}, logits, 1000)) << "all";
 }
 
 TEST(CodeSampler, HugeAndInfiniteLogitsAreStableAndNaNIsTold) {
   EXPECT_EQ(sampled({}, {-1e4f, 1e4f, 0}), 1);
-  EXPECT_EQ(sampled({1e6f, 1, 0}, {-1e4f, 1e4f, 0}), 1);
   EXPECT_EQ(sampled({}, {3, kForEver, 1e30f}), 1);
-  EXPECT_EQ(sampled({kForEver, 0, 0}, {3, kForEver, 1e30f}), 1);
+  EXPECT_EQ(sampled({kForEver, 0}, {3, kForEver, 1e30f}), 1);
   const std::vector<int> of_two = counts_of({}, {kForEver, 5, kForEver}, 10000);
   EXPECT_LT(chi_square(of_two, {0.5, 0, 0.5}), 20);
-  const std::vector<int> without = counts_of({kForEver, 0, 0}, {1, -kForEver, 2, -kForEver}, 10000);
+  const std::vector<int> without = counts_of({kForEver, 0}, {1, -kForEver, 2, -kForEver}, 10000);
   EXPECT_LT(chi_square(without, {0.5, 0, 0.5, 0}), 20);
   const std::vector<int> of_none = counts_of({}, std::vector<float>(4, -kForEver), 10000);
   EXPECT_LT(chi_square(of_none, std::vector<double>(4, 0.25)), 25);
   for (const float temperature : {0.0f, 1.0f, kForEver}) {
-    expect_error(MAQ_ERROR_INFERENCE, "NaN", [&] { sampled({temperature, 0, 0}, {1, 2, kNotANumber}); });
+    expect_error(MAQ_ERROR_INFERENCE, "NaN", [&] { sampled({temperature, 0}, {1, 2, kNotANumber}); });
   }
 }
 
@@ -147,7 +127,7 @@ TEST(CodeSampler, EveryPositionAndSeedHasANumberOfItsOwn) {
     changed[2].sample = changed[3].group = uint16_t(i);
     changed[4].cell = uint32_t(i);
     for (const maq::SamplePosition& position : changed) equal += sampler.sample(even.data(), position) == first ? 1 : 0;
-    maq::CodeSampler other({1, 0, uint64_t(i) << 32}, 512);
+    maq::CodeSampler other({1, uint64_t(i) << 32}, 512);
     equal += other.sample(even.data(), {}) == first ? 1 : 0;
   }
   EXPECT_LE(equal, 8) << "of 600; one of 512 by chance";
@@ -155,10 +135,8 @@ TEST(CodeSampler, EveryPositionAndSeedHasANumberOfItsOwn) {
 
 TEST(CodeSampler, SettingsOutOfRangeAreRefused) {
   for (const float temperature : {-1.0f, -kForEver, kNotANumber}) {
-    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "temperature", [&] { maq::CodeSampler({temperature, 0, 0}, 512); });
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "temperature", [&] { maq::CodeSampler({temperature, 0}, 512); });
   }
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "top_k is 513", [] { maq::CodeSampler({1, 513, 0}, 512); });
-  EXPECT_NO_THROW(maq::CodeSampler({1, 512, 0}, 512));
 }
 
 }  // namespace

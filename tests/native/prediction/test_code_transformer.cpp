@@ -90,7 +90,7 @@ TEST(CodeTransformer, TheLikeliestCodesEqualPython) {
   for (const size_t samples : {1u, 3u, 1u}) {
     std::vector<uint16_t> found(samples * kCodes);
     const std::vector<maq::CodesBefore> each(samples, before(3));
-    transformer->sample(each, {0, 0, 0}, 0, 0, never, found.data(), nullptr);
+    transformer->sample(each, {0, 0}, 0, 0, never, found.data(), nullptr);
     for (size_t i = 0; i < found.size(); ++i) ASSERT_EQ(found[i], uint8_t(expected[i % kCodes])) << samples << " " << i;
   }
 }
@@ -116,7 +116,7 @@ std::vector<SampledCodes> sampled_after(maq::CodeTransformer& transformer, const
 
 TEST(CodeTransformer, ASampleDependsOnNoOtherAlsoWithOtherContexts) {
   const auto transformer = tiny_transformer::open();
-  const maq::SamplingSettings sampling{1, 0, 5};
+  const maq::SamplingSettings sampling{1, 5};
   const std::vector<SampledCodes> alone = sampled_after(*transformer, {before(3)}, sampling),
                                   of_four = sampled_after(*transformer, {before(3), before(5), before(3), before(3)},
                                                           sampling),
@@ -135,7 +135,7 @@ TEST(CodeTransformer, TheMeanBitsOfSamplesAreTheEntropy) {
   constexpr uint32_t kSampledCodess = 4;
   for (uint32_t frame = 0; frame < kSampledCodess; ++frame) {
     const std::vector<maq::CodesBefore> each(4, before(3));
-    for (const SampledCodes& sampled : sampled_after(*transformer, each, {1, 0, 2}, frame)) {
+    for (const SampledCodes& sampled : sampled_after(*transformer, each, {1, 2}, frame)) {
       transformer->bits(before(3), sampled.codes.data(), of_codes.data());
       for (size_t i = 0; i < kCodes; ++i) {
         entropy += double(sampled.entropy[i]);
@@ -155,15 +155,15 @@ TEST(CodeTransformer, SampledCodesHaveThePredictedBits) {
   std::vector<float> bits(kCodes);
   double total = 0;
   for (uint32_t frame = 0; frame < 4; ++frame) {
-    transformer->sample(both, {1, 0, 11}, 0, frame, never, sampled.data(), nullptr);
-    transformer->sample(both, {1, 0, 11}, 0, frame, never, again.data(), nullptr);
+    transformer->sample(both, {1, 11}, 0, frame, never, sampled.data(), nullptr);
+    transformer->sample(both, {1, 11}, 0, frame, never, again.data(), nullptr);
     EXPECT_EQ(sampled, again);
     EXPECT_FALSE(std::equal(sampled.begin(), sampled.begin() + kCodes, sampled.begin() + kCodes)) << "samples differ";
     for (size_t sample = 0; sample < 2; ++sample) {
       transformer->bits(before(3), sampled.data() + sample * kCodes, bits.data());
       for (const float of_code : bits) total += double(of_code) / (8 * kCodes);
     }
-    transformer->sample(both, {1, 0, 12}, 0, frame, never, again.data(), nullptr);
+    transformer->sample(both, {1, 12}, 0, frame, never, again.data(), nullptr);
     EXPECT_NE(sampled, again) << "another seed";
   }
   // The mean of what is sampled is the entropy, which is near the bits of frames that were like those in training.

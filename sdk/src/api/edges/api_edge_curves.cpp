@@ -2,6 +2,7 @@
 
 #include "api/boundary.h"
 #include "api/edges/edges_handle.h"
+#include "core/clock.h"
 #include "edges/files/curve_files.h"
 #include "edges/measuring/snap.h"
 
@@ -55,18 +56,26 @@ Vec3 read_vector(const double* from, const char* name) {
 
 }  // namespace
 
+void CurveFinder::find(const EdgeField& field, const CurveRequest& request, FoundCurves& found) {
+  Stopwatch stage;
+  extractor_.set_options(request.options);
+  found.curves = extractor_.extract(field);
+  found.curves_ms = float(stage.lap_ms());
+  found.boxes.clear();
+  if (request.finds_boxes) box_finder_.find(field, found.curves, found.boxes);
+  found.boxes_ms = request.finds_boxes ? float(stage.lap_ms()) : 0;
+  found.seen.width = field.width;
+  found.seen.height = field.height;
+  found.seen.intrinsics = field.intrinsics;
+  found.seen.depth_m = field.depth_m;
+}
+
 CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char* name) {
   const maq_edges_curves_config config = read_config(given, name, default_curves_config());
   require_range(concatenate(name, ".skip_boxes"), config.skip_boxes, 0, 1);
   CurveRequest request;
   request.finds_boxes = config.skip_boxes == 0;
-  const auto set = [](float& option, float value) { option = value == 0 ? option : value; };
-  set(request.options.vote_radius_px, config.vote_radius_px);
-  set(request.options.min_votes, config.min_votes);
-  set(request.options.flying_pixel_band_px, config.flying_pixel_band_px);
-  set(request.options.fit_band_px, config.fit_band_px);
-  set(request.options.split_angle_deg, config.split_angle_deg);
-  set(request.options.min_length_px, config.min_length_px);
+  if (config.min_length_px != 0) request.options.min_length_px = config.min_length_px;
   (void)CurveExtractor(request.options);  // checks them
   return request;
 }

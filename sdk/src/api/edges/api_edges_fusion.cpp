@@ -28,12 +28,10 @@ FusionOptions fusion_options(const maq_edges_fusion_config& config) {
   constexpr uint64_t kMaxCount = uint64_t(1) << 32;
   require_range("config.threads", config.threads, 0, kMaxThreads);
   require_range("config.cell_m", config.cell_m, 0.0, 1e9);
-  require_range("config.max_pixels", config.max_pixels, uint64_t(0), kMaxCount);
   require_range("config.max_points", config.max_points, uint64_t(0), kMaxCount - 2);
   require_range("config.min_views", config.min_views, 0, 1000);
   FusionOptions options;
   options.cell_m = config.cell_m;
-  if (config.max_pixels != 0) options.max_pixels = int64_t(config.max_pixels);
   if (config.max_points != 0) options.max_points = int64_t(config.max_points);
   return options;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "api/handle.h"
+#include "edges/curves/curve_extractor.h"
 #include "edges/edges.h"
-#include "edges/measuring/curve_finder.h"
+#include "edges/measuring/boxes.h"
 #include "maquette/edge_curves.h"
 
 namespace maq {
@@ -20,6 +22,30 @@ EdgesSettings edges_settings(const maq_edges_config& config, const char* name);
 
 // Returns the number of results that the app may hold at once.
 uint32_t result_pool_size_of(const maq_edges_config& config);
+
+struct CurveRequest {
+  CurveOptions options;
+  bool finds_boxes = true;
+};
+
+// The curves and boxes of a field, which may outlive it.
+struct FoundCurves {
+  EdgeCurves curves;
+  std::vector<MeasuredBox> boxes;
+  EdgeField seen;  // camera and depth alone, for snapping
+  float curves_ms = 0, boxes_ms = 0;
+};
+
+// Finds curves and boxes. Keeps memory from frame to frame. One thread at a time.
+class CurveFinder {
+ public:
+  // Overwrites `found` and reuses its memory. Throws the errors of CurveExtractor.
+  void find(const EdgeField& field, const CurveRequest& request, FoundCurves& found);
+
+ private:
+  CurveExtractor extractor_;
+  BoxFinder box_finder_;
+};
 
 // Checks a config and converts it to a request; `name` begins error texts.
 CurveRequest curve_request(const maq_edges_curves_config* given, const char* name);

@@ -76,7 +76,7 @@ PredictorRecipe recipe_of(ContextState& state, const maq_predictor_config& confi
     open_networks(state, config, recipe);
   }
   if (recipe.method == PredictionMethod::kSampled) {
-    recipe.sampling = {config.temperature, config.top_k, config.seed};
+    recipe.sampling = {config.temperature, config.seed};
     const CodeSampler checked(recipe.sampling, recipe.sampler.encoder->codes().entries);
   }
   return recipe;

@@ -72,20 +72,10 @@ void take_arc(const ArcFit& arc, double from_rad, double sweep_rad, EdgeCurve& c
 
 }  // namespace
 
-CurveExtractor::CurveExtractor(const CurveOptions& options) : options_(options) {
-  const CurveOptions& o = options;
-  require(o.vote_radius_px > 0 && o.vote_radius_px <= 16, "vote_radius_px", o.vote_radius_px, "above 0 and at most 16");
-  require(o.min_votes > 0 && o.min_votes <= 100, "min_votes", o.min_votes, "above 0 and at most 100");
-  require(o.flying_pixel_band_px >= 0 && o.flying_pixel_band_px <= 32, "flying_pixel_band_px", o.flying_pixel_band_px,
-          "0 to 32");
-  require(o.fit_band_px >= 2 && o.fit_band_px <= 64, "fit_band_px", o.fit_band_px, "2 to 64");
-  require(o.split_angle_deg > 0 && o.split_angle_deg <= 180, "split_angle_deg", o.split_angle_deg,
-          "above 0 and at most 180");
-  require(o.min_length_px >= 4 && o.min_length_px <= 1e6f, "min_length_px", o.min_length_px, "4 to 1e6");
-  require(o.tolerance_r > 0 && o.tolerance_r <= 16, "tolerance_r", o.tolerance_r, "above 0 and at most 16");
-  require(o.gap_r > 0 && o.gap_r <= 1e6f, "gap_r", o.gap_r, "above 0 and at most 1e6");
-  require(o.merge_radius_px >= 0 && o.merge_radius_px <= 64, "merge_radius_px", o.merge_radius_px, "0 to 64");
-  require(o.max_curves > 0 && o.max_curves <= 1 << 16, "max_curves", o.max_curves, "1 to 65536");
+void CurveExtractor::set_options(const CurveOptions& options) {
+  const float length_px = options.min_length_px;
+  require(length_px >= 4 && length_px <= 1e6f, "min_length_px", length_px, "4 to 1e6");
+  options_ = options;
 }
 
 const EdgeCurves& CurveExtractor::extract(const EdgeField& field) {
@@ -96,7 +86,7 @@ const EdgeCurves& CurveExtractor::extract(const EdgeField& field) {
   found_.controls.clear();
   found_.counts = CurveCounts();
   drafts_.clear();
-  votes_.gather(field, options_.vote_radius_px, found_.counts);
+  votes_.gather(field, found_.counts);
   chains_.trace(votes_, options_, found_.counts);
   for (const RidgeChain& chain : chains_.chains) draft_curves(field, chain);
   join_corners(field);
@@ -105,7 +95,7 @@ const EdgeCurves& CurveExtractor::extract(const EdgeField& field) {
 }
 
 void CurveExtractor::draft_curves(const EdgeField& field, const RidgeChain& chain) {
-  if (!stations_.measure(field, chains_.points.data(), chain, options_)) {
+  if (!stations_.measure(field, chains_.points.data(), chain)) {
     ++found_.counts.without_depth;
     return;
   }
@@ -153,7 +143,7 @@ bool CurveExtractor::draft_arcs(const EdgeField& field, const RidgeChain& chain)
   const auto n = int(stations_.stations.size());
   gather_points(field, {0, n, kCreaseEdge, -1});
   const auto arc = arc_fitter_.fit(fit_points_.data(), fit_points_.size());
-  if (!arc || !(arc->rms <= options_.tolerance_r)) return false;
+  if (!arc || !(arc->rms <= kToleranceR)) return false;
   const auto angle_of = [&](int k) {
     const CurveStation& s = stations_.stations[size_t((k % n + n) % n)];
     const Vec3 d = s.point - arc->centre;
@@ -190,7 +180,7 @@ bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, co
   const bool is_closed = chain.is_closed && stations_.runs.size() == 1;
   const auto line = fit_line(points, count);
   if (!line) return false;
-  if (!is_closed && (line->rms <= options_.tolerance_r || stations_.is_straight)) {
+  if (!is_closed && (line->rms <= kToleranceR || stations_.is_straight)) {
     if (!(line->rms <= kWorst_r)) return false;
     curve.type = CurveType::kLine;
     curve.rms_footprints = line->rms;
@@ -200,12 +190,12 @@ bool CurveExtractor::fit_run(const EdgeField& field, const RidgeChain& chain, co
     draft.outward = {-along, along};
     return true;
   }
-  if (const auto arc = arc_fitter_.fit(points, count); arc && arc->rms <= options_.tolerance_r) {
+  if (const auto arc = arc_fitter_.fit(points, count); arc && arc->rms <= kToleranceR) {
     curve.is_closed = arc->is_closed;
     take_arc(*arc, 0, arc->sweep_rad, curve, draft.end, draft.outward);
     return true;
   }
-  const auto rms = spline_fitter_.fit(points, count, is_closed, options_.tolerance_r);
+  const auto rms = spline_fitter_.fit(points, count, is_closed, kToleranceR);
   if (!rms || !(*rms <= kWorst_r)) return false;
   curve.type = CurveType::kSpline;
   curve.rms_footprints = *rms;
@@ -322,7 +312,7 @@ void CurveExtractor::lengthen_end(const EdgeField& field, Draft& draft, int whic
     if (!(px > -0.5 && py > -0.5 && px < field.width - 0.5 && py < field.height - 0.5)) break;
     const size_t at = size_t(std::lround(py)) * size_t(field.width) + size_t(std::lround(px));
     const double along = (dy * dy - dx * dx) * votes_.cos2[at] - 2 * dx * dy * votes_.sin2[at];
-    if (!(along > 0.3 * options_.min_votes)) break;
+    if (!(along > 0.3 * kMinVotes)) break;
     const Vec3 reached = seen_on_line(field.intrinsics, px, py, end, outward);
     if (reached.z > 0) draft.end[size_t(which)] = reached;
   }
@@ -339,7 +329,7 @@ void CurveExtractor::join_corners(const EdgeField& field) {
                        draft.step_m[size_t(k)], -1});
     }
   }
-  corner_finder_.find(ends_, options_.merge_radius_px, found_.corners);
+  corner_finder_.find(ends_, kMergeRadiusPx, found_.corners);
   for (Draft& draft : drafts_) draft.curve.corner = {-1, -1};
   for (const CurveEnd& end : ends_) {
     Draft& draft = drafts_[size_t(end.curve)];
@@ -353,7 +343,7 @@ void CurveExtractor::move_end(Draft& draft, int which, Vec3 to) {
   if (curve.type == CurveType::kArc) {
     const Vec3 d = to - curve.centre;
     const double angle = std::atan2(dot(d, curve.y_axis), dot(d, curve.x_axis));
-    const double reach = draft.step_m[size_t(which)] * 1.5 * options_.merge_radius_px / length(curve.x_axis);
+    const double reach = draft.step_m[size_t(which)] * 1.5 * kMergeRadiusPx / length(curve.x_axis);
     if (which == 1) {
       const double change = std::remainder(angle - curve.sweep_rad, 2 * M_PI);
       if (std::abs(change) <= reach) curve.sweep_rad = std::clamp(curve.sweep_rad + change, 1e-6, 2 * M_PI);

@@ -16,7 +16,8 @@ namespace maq {
 class CurveExtractor {
  public:
   // Throws MAQ_ERROR_INVALID_ARGUMENT for an option out of range.
-  explicit CurveExtractor(const CurveOptions& options = {});
+  explicit CurveExtractor(const CurveOptions& options = {}) { set_options(options); }
+  void set_options(const CurveOptions& options);
 
   // Returns curves that are valid until the next call. Keeps memory from frame to frame. Accepts any field: values that
   // are not numbers are dropped and counted, a field without edges has no curves. Throws MAQ_ERROR_INVALID_ARGUMENT for

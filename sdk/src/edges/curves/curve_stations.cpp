@@ -153,19 +153,19 @@ void CurveStations::gather_band(const EdgeField& field, const CurveStation& s, c
   }
 }
 
-SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
-                                     int side, double half_window_px, bool may_bend) {
+SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveStation& s, int side, double half_window_px,
+                                     bool may_bend) {
   // Outside of the band of flying pixels, or nearer if the surface is too narrow.
-  const Band band{side, half_window_px, double(options.flying_pixel_band_px) + double(options.fit_band_px), 1};
+  const Band band{side, half_window_px, double(kFlyingPixelBandPx) + double(kFitBandPx), 1};
   for (const double smear : {1.0, 0.5, 0.15}) {
     band_.clear();
-    gather_band(field, s, band, smear * options.flying_pixel_band_px + 0.5);
+    gather_band(field, s, band, smear * kFlyingPixelBandPx + 0.5);
     if (band_.size() >= 12) break;
   }
   const SurfacePatch patch = fitter_.fit(band_, s.x, s.y, focal_px(field.intrinsics), may_bend);
   if (patch.terms == 0 || !(patch.rms_footprints > kNoisy_r)) return patch;
   narrow_.swap(band_);
-  const SurfacePatch wide = fit_noisy_side(field, options, s, side, half_window_px, may_bend);
+  const SurfacePatch wide = fit_noisy_side(field, s, side, half_window_px, may_bend);
   if (wide.terms != 0 && wide.rms_footprints <= kSameNoise * patch.rms_footprints) return wide;
   band_.swap(narrow_);
   return patch;
@@ -173,13 +173,11 @@ SurfacePatch CurveStations::fit_side(const EdgeField& field, const CurveOptions&
 
 // Noisy depth needs a wide band, but a quarter of its pixels is enough: all of the band if depth at the edge is as good
 // as elsewhere, or else its part away from the edge.
-SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s,
-                                           int side, double half_window_px, bool may_bend) {
-  const double focal = focal_px(field.intrinsics), away_px = double(options.flying_pixel_band_px) + 0.5;
+SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveStation& s, int side,
+                                           double half_window_px, bool may_bend) {
+  const double focal = focal_px(field.intrinsics), away_px = double(kFlyingPixelBandPx) + 0.5;
   band_.clear();
-  gather_band(field, s,
-              {side, half_window_px, double(options.flying_pixel_band_px) + kWider * double(options.fit_band_px), 2},
-              0.5);
+  gather_band(field, s, {side, half_window_px, double(kFlyingPixelBandPx) + kWider * double(kFitBandPx), 2}, 0.5);
   const SurfacePatch whole = fitter_.fit(band_, s.x, s.y, focal, may_bend);
   double squares = 0, squares_away = 0, count_away = 0;
   for (const BandPixel& pixel : band_) {
@@ -197,7 +195,7 @@ SurfacePatch CurveStations::fit_noisy_side(const EdgeField& field, const CurveOp
   return fitter_.fit(band_, s.x, s.y, focal, may_bend);
 }
 
-void CurveStations::fit_sides(const EdgeField& field, const CurveOptions& options) {
+void CurveStations::fit_sides(const EdgeField& field) {
   sums_.assign(2 * stations.size(), PlaneSums());
   // A short edge is one window: patches of a few pixels each would not agree on its slope along the ray.
   const bool is_one = is_straight && stations.size() <= 3;
@@ -208,10 +206,10 @@ void CurveStations::fit_sides(const EdgeField& field, const CurveOptions& option
     // A surface that does not bend beside the middle of a straight edge is not asked again: that takes most of the
     // time.
     bool may_bend = true;
-    if (is_straight) may_bend = fit_side(field, options, stations[middle], side, half_window, true).terms == 6;
+    if (is_straight) may_bend = fit_side(field, stations[middle], side, half_window, true).terms == 6;
     for (size_t k = is_one ? middle : 0; k < (is_one ? middle + 1 : stations.size()); ++k) {
       CurveStation& s = stations[k];
-      s.side[at] = fit_side(field, options, s, side, half_window, may_bend);
+      s.side[at] = fit_side(field, s, side, half_window, may_bend);
       if (s.side[at].terms == 0 || !is_straight) continue;
       PlaneSums& sums = sums_[2 * k + at];
       sums.begin(stations[0].x, stations[0].y, s.side[at].coefficient[0]);
@@ -268,7 +266,7 @@ void CurveStations::measure_field_gaps(const EdgeField& field) {
 
 // A crease where both surfaces reach the edge at one depth and the field does not say boundary; else the boundary of
 // the nearer one. An edge at which the field falls to 0 on one side belongs to that side.
-void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed) {
+void CurveStations::choose_kinds(const EdgeField& field, bool is_closed) {
   const auto n = int(stations.size());
   measure_field_gaps(field);
   for (CurveStation& s : stations) {
@@ -298,7 +296,7 @@ void CurveStations::choose_kinds(const EdgeField& field, const CurveOptions& opt
       const auto a = s.side[0].slope(s.x, s.y), b = s.side[1].slope(s.x, s.y);
       const double slack = focal_px(field.intrinsics) * std::hypot(a[0] - b[0], a[1] - b[1]) / std::max(q0, q1);
       const double sigma = std::hypot(s.side[0].edge_sigma_r, s.side[1].edge_sigma_r);
-      if (std::abs(s.gap_r) > options.gap_r + slack + 3 * sigma) s.is_boundary = true;
+      if (std::abs(s.gap_r) > kGapR + slack + 3 * sigma) s.is_boundary = true;
     }
     const bool is_one_sided = std::abs(field_gap) > kClearly_px;
     if (is_one_sided) {
@@ -557,13 +555,12 @@ void CurveStations::part_at_gaps(const EdgeField& field) {
   runs.swap(parts_);
 }
 
-bool CurveStations::measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain,
-                            const CurveOptions& options) {
+bool CurveStations::measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain) {
   place(points, chain);
   if (stations.size() < 2) return false;
-  fit_sides(field, options);
+  fit_sides(field);
   fit_whole_sides(field);
-  choose_kinds(field, options, chain.is_closed);
+  choose_kinds(field, chain.is_closed);
   for (int round = 0; round < 2; ++round) {
     move_across(field);
     if (is_straight) straighten();

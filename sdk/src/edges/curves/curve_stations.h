@@ -43,7 +43,7 @@ class CurveStations {
   std::array<SurfacePatch, 2> whole_side;
 
   // Returns false if no surface is known beside the chain.
-  bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain, const CurveOptions& options);
+  bool measure(const EdgeField& field, const RidgePoint* points, const RidgeChain& chain);
 
   // After measure(): two edges, one behind the other, are one chain. Stations and runs become the farther one's;
   // returns false if there is none.
@@ -58,13 +58,12 @@ class CurveStations {
     int step_px;
   };
   void gather_band(const EdgeField& field, const CurveStation& s, const Band& band, double from_px);
-  SurfacePatch fit_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s, int side,
-                        double half_window_px, bool may_bend);
-  SurfacePatch fit_noisy_side(const EdgeField& field, const CurveOptions& options, const CurveStation& s, int side,
-                              double half_window_px, bool may_bend);
-  void fit_sides(const EdgeField& field, const CurveOptions& options);
+  SurfacePatch fit_side(const EdgeField& field, const CurveStation& s, int side, double half_window_px, bool may_bend);
+  SurfacePatch fit_noisy_side(const EdgeField& field, const CurveStation& s, int side, double half_window_px,
+                              bool may_bend);
+  void fit_sides(const EdgeField& field);
   void fit_whole_sides(const EdgeField& field);
-  void choose_kinds(const EdgeField& field, const CurveOptions& options, bool is_closed);
+  void choose_kinds(const EdgeField& field, bool is_closed);
   void measure_field_gaps(const EdgeField& field);
   void find_runs(bool is_closed);
   void move_across(const EdgeField& field);

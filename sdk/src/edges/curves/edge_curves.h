@@ -13,24 +13,18 @@
 namespace maq {
 
 // r: a footprint (edge_field.h). px: pixels of the frame.
-struct CurveOptions {
-  float vote_radius_px = 4;        // pixels nearer than this to an edge vote for its position
-  float min_votes = 0.35f;         // votes an edge needs; 1 is the sum of all votes from one side
-  float flying_pixel_band_px = 3;  // half-width of the band of mixed pixels: no plane is fitted to it
-  float fit_band_px = 8;  // width of the band beyond flying_pixel_band_px to which surfaces are fitted; wider in noise
-  float split_angle_deg = 15;  // a curve that turns by more at one point is split
-  float min_length_px = 10;    // shorter curves are dropped, except for the 3 px that a corner may hide
-  float tolerance_r = 0.5f;    // the simplest type with this root mean square distance is taken
-  float gap_r = 2.5f;          // surfaces farther apart along the ray do not meet in a crease
-  float merge_radius_px = 12;  // ends this near the point where their curves meet share a corner
-  int max_curves = 1024;       // more are dropped and counted
+inline constexpr float kVoteRadiusPx = 4;       // pixels nearer than this to an edge vote for its position
+inline constexpr float kMinVotes = 0.35f;       // votes an edge needs; 1 is the sum of all votes from one side
+inline constexpr float kFlyingPixelBandPx = 3;  // half-width of the band of mixed pixels: no plane is fitted to it
+inline constexpr float kFitBandPx = 8;          // width of the band beyond it to which surfaces are fitted
+inline constexpr float kSplitAngleDeg = 15;     // a curve that turns by more at one point is split
+inline constexpr float kToleranceR = 0.5f;      // the simplest type with this root mean square distance is taken
+inline constexpr float kGapR = 2.5f;            // surfaces farther apart along the ray do not meet in a crease
+inline constexpr float kMergeRadiusPx = 12;     // ends this near the point where their curves meet share a corner
 
-  bool operator==(const CurveOptions& o) const {
-    return vote_radius_px == o.vote_radius_px && min_votes == o.min_votes &&
-           flying_pixel_band_px == o.flying_pixel_band_px && fit_band_px == o.fit_band_px &&
-           split_angle_deg == o.split_angle_deg && min_length_px == o.min_length_px && tolerance_r == o.tolerance_r &&
-           gap_r == o.gap_r && merge_radius_px == o.merge_radius_px && max_curves == o.max_curves;
-  }
+struct CurveOptions {
+  float min_length_px = 10;  // shorter curves are dropped, except for the 3 px that a corner may hide
+  int max_curves = 1024;     // more are dropped and counted
 };
 
 enum class CurveType : uint8_t { kLine, kArc, kSpline };

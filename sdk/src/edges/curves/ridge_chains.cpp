@@ -151,7 +151,7 @@ void RidgeChains::part_at_turns(RidgeChain chain, const CurveOptions& options, C
   const int n = chain.count;
   const RidgePoint* p = points.data() + chain.first;
   turns_.assign(size_t(n), 0.0f);
-  const double least = double(options.split_angle_deg) * (3.14159265358979 / 180);
+  const double least = double(kSplitAngleDeg) * (3.14159265358979 / 180);
   for (int i = 4 + kRounded; i + 4 + kRounded < n; ++i) {
     const int before = std::min(i - kRounded, kWindow), after = std::min(n - 1 - i - kRounded, kWindow);
     const RidgePoint *head = p + i - kRounded - before, *tail = p + i + kRounded + 1;
@@ -181,12 +181,12 @@ void RidgeChains::trace(const RidgeVotes& votes, const CurveOptions& options, Cu
   points.clear();
   chains.clear();
   if (votes.width < 3 || votes.height < 3) return;
-  find_crests(votes, 0.5f * options.min_votes);
+  find_crests(votes, 0.5f * kMinVotes);
   for (size_t seed = 0; seed < crests_.size(); ++seed) {
     const Crest& crest = crests_[seed];
     if (is_used_[seed]) continue;
     const int x = int(std::lround(crest.x)), y = int(std::lround(crest.y));
-    if (value_at(votes.weight, votes.width, votes.height, float(x), float(y)) < options.min_votes) continue;
+    if (value_at(votes.weight, votes.width, votes.height, float(x), float(y)) < kMinVotes) continue;
     is_used_[seed] = 1;
     ++counts.chains;
     const auto first = points.size();

@@ -85,7 +85,7 @@ float quick_slope(const EdgeField& field, int x, int y) {
 
 }  // namespace
 
-void RidgeVotes::gather(const EdgeField& field, float vote_radius_px, CurveCounts& counts) {
+void RidgeVotes::gather(const EdgeField& field, CurveCounts& counts) {
   width = field.width, height = field.height;
   const size_t pixels = size_t(width) * size_t(height);
   for (auto* plane : {&weight, &cos2, &sin2}) plane->assign(pixels, 0.0f);
@@ -97,20 +97,20 @@ void RidgeVotes::gather(const EdgeField& field, float vote_radius_px, CurveCount
         ++counts.bad_pixels;
         continue;
       }
-      if (distance >= field.eps_r || distance > vote_radius_px * std::max(1.0f, 1.2f * quick_slope(field, x, y)))
+      if (distance >= field.eps_r || distance > kVoteRadiusPx * std::max(1.0f, 1.2f * quick_slope(field, x, y)))
         continue;
       const Gradient g = gradient_at(field, x, y);
       const float slope = std::hypot(g.x, g.y);
       // A pixel is at least one r wide: a smaller slope means a ridge within the window. On the ridge itself both sides
       // cancel. A field without a slope casts no vote.
       const float step_px = distance / std::max(slope, 1.0f);
-      if (!g.is_known || !(slope > 0.25f) || step_px > vote_radius_px || is_at_jump(field, x, y)) continue;
+      if (!g.is_known || !(slope > 0.25f) || step_px > kVoteRadiusPx || is_at_jump(field, x, y)) continue;
       ++counts.voting_pixels;
       const float to_x = float(x) - g.x * step_px / slope, to_y = float(y) - g.y * step_px / slope;
       const auto left = int(std::floor(to_x)), top = int(std::floor(to_y));
       if (left < 0 || top < 0 || left + 1 >= width || top + 1 >= height) continue;
       const float spread = field.expected_error_r[at],
-                  vote = 1 / (vote_radius_px * kCrest * (1 + 0.25f * spread * spread));
+                  vote = 1 / (kVoteRadiusPx * kCrest * (1 + 0.25f * spread * spread));
       if (!(vote > 0)) continue;
       const float fx = to_x - float(left), fy = to_y - float(top);
       const float c2 = (g.x * g.x - g.y * g.y) / (slope * slope), s2 = 2 * g.x * g.y / (slope * slope);

@@ -15,7 +15,7 @@ struct RidgeVotes {
   std::vector<float> cos2, sin2;  // weight * double angle of the direction across the edge
   std::vector<float> scratch;     // a row each of the smoothing
 
-  void gather(const EdgeField& field, float vote_radius_px, CurveCounts& counts);
+  void gather(const EdgeField& field, CurveCounts& counts);
 };
 
 }  // namespace maq

@@ -45,19 +45,6 @@ void check_not_cancelled(const std::atomic<bool>& is_cancelled) {
 
 }  // namespace
 
-FieldFusion::FieldFusion(const FusionOptions& options) : options_(options) {
-  const auto require = [](const char* name, double value, double low, double high) {
-    if (!(value >= low && value <= high)) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The fusion's ", name, " is ", value, ", but must be ", low, " to ", high,
-                  ".");
-    }
-  };
-  require("cell_m", options.cell_m, 0, 1e9);
-  require("reach_r", options.reach_r, 1, 100);
-  require("max_pixels", double(options.max_pixels), 1, 1e12);
-  require("max_points", double(options.max_points), 1, 4e9);
-}
-
 void FieldFusion::add_view(const EdgeField& field, const PinholeCamera& pose) {
   check_field(field);
   check_camera(pose, "The view's camera");
@@ -74,7 +61,7 @@ void FieldFusion::add_view(const EdgeField& field, const PinholeCamera& pose) {
   if (pixels_ + pixels > options_.max_pixels) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "With this view of ", field.width, " x ", field.height, " pixels there are ",
                 pixels_ + pixels, " of all views, over the limit of ", options_.max_pixels,
-                "; add fewer or smaller views, or raise max_pixels.");
+                "; add fewer or smaller views.");
   }
   FusionView view(field, pose);
   if (view.known_pixels() > 0) {

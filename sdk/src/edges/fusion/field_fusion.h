@@ -41,8 +41,7 @@ struct FusedField {
 
 class FieldFusion {
  public:
-  // Throws MAQ_ERROR_INVALID_ARGUMENT for an option out of range.
-  explicit FieldFusion(const FusionOptions& options = {});
+  explicit FieldFusion(const FusionOptions& options = {}) : options_(options) {}
 
   // Keeps the field of a view; `pose` is its camera. A view without known depth is counted, but not kept. Throws
   // MAQ_ERROR_INVALID_ARGUMENT for planes of another size and for an eps_r that differs from earlier views, the errors

@@ -4,24 +4,6 @@
 
 namespace maq::head {
 
-AngleFactors angle_factors(double angle) {
-  const double square = angle * angle;
-  if (!(square < 1)) {
-    const double s = std::sin(angle), c = std::cos(angle);
-    return {(angle - s) / (square * angle), (square / 2 + c - 1) / (square * square),
-            (2 * angle + angle * c - 3 * s) / (2 * square * square * angle)};
-  }
-  AngleFactors sum{0, 0, 0};
-  double term = 1.0 / 6;  // (-square)^k / (2k + 3)!
-  for (int k = 0; k < 9; ++k) {
-    sum.cubic += term;
-    sum.quartic += term / (2 * k + 4);
-    sum.quintic += term * (k + 1) / ((2 * k + 4) * (2 * k + 5));
-    term *= -square / ((2 * k + 4) * (2 * k + 5));
-  }
-  return sum;
-}
-
 namespace {
 
 double sine_ratio(double angle) { return angle > 0 ? std::sin(angle) / angle : 1; }
@@ -57,25 +39,6 @@ Vec3 log_rotation(const Mat3& r) {
   if (real < 0) real = -real, q = -q;
   const double size = length(q);
   return size > 0 ? (2 * std::atan2(size, real) / size) * q : Vec3{};
-}
-
-Mat3 left_jacobian(Vec3 w) {
-  const double angle = length(w);
-  const Mat3 cross = cross_matrix(w);
-  return kIdentity3 + cosine_ratio(angle) * cross + angle_factors(angle).cubic * (cross * cross);
-}
-
-RigidMotion exp_motion(const Twist& twist) { return {exp_rotation(twist.w), left_jacobian(twist.w) * twist.v}; }
-
-PointJacobian point_jacobian(const Twist& twist, Vec3 p) {
-  const AngleFactors factors = angle_factors(length(twist.w));
-  const Mat3 w = cross_matrix(twist.w), v = cross_matrix(twist.v);
-  const Mat3 wv = w * v, vw = v * w, wvw = wv * w;
-  // The upper right block of the left Jacobian of SE(3).
-  const Mat3 mixed = 0.5 * v + factors.cubic * (wv + vw + wvw) + factors.quartic * (w * wv + vw * w + -3 * wvw) +
-                     factors.quintic * (wvw * w + w * wvw);
-  const Mat3 jacobian = left_jacobian(twist.w);
-  return {mixed + cross_matrix(-(exp_motion(twist) * p)) * jacobian, jacobian};
 }
 
 }  // namespace maq::head

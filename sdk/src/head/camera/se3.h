@@ -1,5 +1,5 @@
-// Rigid motions and their exponential map, float64: the corrections of a camera in the fit, and rotations in pose
-// estimation. Accurate at any angle, 0 and pi included (T. Barfoot, State Estimation for Robotics, chapter 7).
+// Rigid motions, and the exponential map of rotations, float64. Accurate at any angle, 0 and pi included (T. Barfoot,
+// State Estimation for Robotics, chapter 7).
 #pragma once
 
 #include <array>
@@ -59,34 +59,10 @@ inline RigidMotion inverse(const RigidMotion& m) {
   return {back, -(back * m.translation)};
 }
 
-// (angle - sin) / angle^3 and its two relatives, which cancel near 0: the parts of exp's derivatives.
-struct AngleFactors {
-  double cubic, quartic, quintic;
-};
-AngleFactors angle_factors(double angle);
-
 // Rodrigues' formula: the rotation by |w| radians about w.
 Mat3 exp_rotation(Vec3 w);
 
 // The shortest w with exp_rotation(w) = r, |w| <= pi; at pi either sign.
 Vec3 log_rotation(const Mat3& r);
-
-// J with exp(w + d) = exp(J d) exp(w) for small d; exp_rotation(w) p changes by -cross_matrix(exp_rotation(w) p) J d.
-Mat3 left_jacobian(Vec3 w);
-
-// A change of a rigid motion: w radians, v in the motion's unit of length.
-struct Twist {
-  Vec3 w, v;
-};
-
-// The rotation is exp_rotation(w), the translation left_jacobian(w) v.
-RigidMotion exp_motion(const Twist& twist);
-
-// How the point exp_motion(twist) p changes with w and with v, each 3x3, for any twist. At 0: -cross_matrix(p) and the
-// identity.
-struct PointJacobian {
-  Mat3 by_w, by_v;
-};
-PointJacobian point_jacobian(const Twist& twist, Vec3 p);
 
 }  // namespace maq::head

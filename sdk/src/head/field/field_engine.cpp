@@ -102,60 +102,46 @@ void FieldEngine::set_weights(const FieldWeights& weights) {
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-FieldEngine::Scratch FieldEngine::scratch(FieldWorkspace& workspace, bool has_tangents) const {
+FieldEngine::Scratch FieldEngine::scratch(FieldWorkspace& workspace) const {
   const size_t rows = max_rows_ * kBlock, points = 3 * kBlock;
-  const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width) * kBlock;
-  const size_t tangents = size_t(shape_.encoding()) * kBlock + hidden_rows;
-  size_t size = 3 * rows + max_stride_ * kBlock + 2 * points;
-  if (has_tangents) size += tangents + hidden_rows;
+  const size_t size = 2 * rows + max_stride_ * kBlock + points;
   if (workspace.scratch_.size() < size) workspace.scratch_.resize(size);
   Scratch at{};
   float* next = workspace.scratch_.data();
   const auto give = [&next](size_t floats) { return std::exchange(next, next + floats); };
   at.a = give(rows);
   at.b = give(rows);
-  at.c = give(rows);
   at.transposed = give(max_stride_ * kBlock);
   at.points = give(points);
-  at.direction = give(points);
-  if (has_tangents) {
-    at.tangents = give(tangents);
-    at.bends = give(hidden_rows);
-  }
   return at;
 }
 
-size_t FieldEngine::kept_rows(bool has_surface, bool has_normals) const {
-  const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width);
-  size_t rows = size_t(shape_.encoding()) + hidden_rows;
-  if (has_normals) rows += hidden_rows;
+size_t FieldEngine::kept_rows(bool has_surface) const {
+  size_t rows = size_t(shape_.encoding()) + size_t(shape_.geometry_layers) * size_t(shape_.width);
   if (has_surface) {
     rows += size_t(shape_.surface_inputs()) + size_t(shape_.surface_layers) * size_t(shape_.surface_width);
   }
   return rows;
 }
 
-void FieldEngine::keep(FieldWorkspace& workspace, size_t count, bool has_surface, bool has_normals) const {
+void FieldEngine::keep(FieldWorkspace& workspace, size_t count, bool has_surface) const {
   workspace.is_kept_ = false;
-  const size_t size = (count + kBlock - 1) / kBlock * kept_rows(has_surface, has_normals) * kBlock;
+  const size_t size = (count + kBlock - 1) / kBlock * kept_rows(has_surface) * kBlock;
   if (workspace.blocks_.size() < size) workspace.blocks_.resize(size);
   workspace.left_out_.assign((count + kBlock - 1) / kBlock, 0);
   workspace.count_ = count;
   workspace.has_surface_ = has_surface;
-  workspace.has_normals_ = has_normals;
 }
 
 FieldEngine::Block FieldEngine::block(FieldWorkspace& workspace, size_t begin) const {
-  const size_t rows = kept_rows(workspace.has_surface_, workspace.has_normals_);
+  const size_t rows = kept_rows(workspace.has_surface_);
   const size_t hidden_rows = size_t(shape_.geometry_layers) * size_t(shape_.width);
   Block at{};
   at.encoding = workspace.blocks_.data() + begin * rows;
   at.geometry = at.encoding + size_t(shape_.encoding()) * kBlock;
-  float* next = at.geometry + hidden_rows * kBlock;
-  if (workspace.has_normals_) at.slopes = std::exchange(next, next + hidden_rows * kBlock);
   if (workspace.has_surface_) {
-    at.surface_input = next;
-    at.surface = next + size_t(shape_.surface_inputs()) * kBlock;
+    at.surface_input = at.geometry + hidden_rows * kBlock;
+    at.surface = at.surface_input + size_t(shape_.surface_inputs()) * kBlock;
   }
   return at;
 }
@@ -206,14 +192,13 @@ void FieldEngine::run_surface(const Block& at, float* out) const {
   run_affine(shape_.layers() - 1, in, out);
 }
 
-// The gradient of the distance by each hidden layer's activations (at.slopes), and by the point (scratch.points).
+// The gradient of the distance by the point (scratch.points).
 void FieldEngine::run_slopes(const Block& at, const Scratch& scratch) const {
   std::fill_n(scratch.a, kBlock, 1.0f);
-  run_transposed(shape_.geometry_layers, 1, scratch.a, hidden(at.slopes, shape_.geometry_layers - 1));
+  run_transposed(shape_.geometry_layers, 1, scratch.a, scratch.b);
   for (int i = shape_.geometry_layers - 1; i >= 0; --i) {
-    kernels_->activation_backward(hidden(at.geometry, i), shape_.width, shape_.smoothing, hidden(at.slopes, i),
-                                  scratch.a);
-    run_transposed(i, shape_.width, scratch.a, i > 0 ? hidden(at.slopes, i - 1) : scratch.b);
+    kernels_->activation_backward(hidden(at.geometry, i), shape_.width, shape_.smoothing, scratch.b, scratch.a);
+    run_transposed(i, shape_.width, scratch.a, scratch.b);
   }
   std::fill_n(scratch.points, 3 * kBlock, 0.0f);
   kernels_->encode_backward(at.encoding, scratch.b, shape_.octaves, scratch.points);
@@ -222,8 +207,8 @@ void FieldEngine::run_slopes(const Block& at, const Scratch& scratch) const {
 void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace, float* distance,
                             const Planes& gradient) const {
   const bool has_gradient = has_any(gradient);
-  const Scratch memory = scratch(workspace, false);
-  keep(workspace, std::min(points.count, kBlock), false, has_gradient);
+  const Scratch memory = scratch(workspace);
+  keep(workspace, std::min(points.count, kBlock), false);
   const Block at = block(workspace, 0);
   for (size_t begin = 0; begin < points.count; begin += kBlock) {
     const size_t count = std::min(kBlock, points.count - begin);
@@ -241,8 +226,8 @@ void FieldEngine::distances(const FieldPoints& points, FieldWorkspace& workspace
 void FieldEngine::forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const {
   const bool has_surface = has_any(values.rgb) || has_any(values.template_point);
   const bool has_normals = has_any(values.normal);
-  const Scratch memory = scratch(workspace, false);
-  keep(workspace, points.count, has_surface, has_normals);
+  const Scratch memory = scratch(workspace);
+  keep(workspace, points.count, has_surface);
   for (size_t begin = 0; begin < points.count; begin += kBlock) {
     const size_t count = std::min(kBlock, points.count - begin);
     const Block at = block(workspace, begin);
@@ -267,7 +252,7 @@ void FieldEngine::forward(const FieldPoints& points, FieldWorkspace& workspace, 
       put(memory.points, begin, count, values.normal);
     }
     // A gradient of 0 times a kept value is then 0.
-    clear(left_out, at.encoding, kept_rows(has_surface, has_normals));
+    clear(left_out, at.encoding, kept_rows(has_surface));
   }
   workspace.is_kept_ = true;
 }
@@ -281,9 +266,6 @@ void FieldEngine::check_backward(const FieldWorkspace& workspace, const FieldVal
   }
   if (!workspace.has_surface_ && (has_any(gradient.rgb) || has_any(gradient.template_point))) {
     throw Error(MAQ_ERROR_INTERNAL, "The surface network of a head's field was not run forwards.");
-  }
-  if (!workspace.has_normals_ && has_any(gradient.normal)) {
-    throw Error(MAQ_ERROR_INTERNAL, "No normals of a head's field were computed to go back from.");
   }
   if (sums.which != WeightGradient::kNone && (sums.weights == nullptr || sums.weights->shape() != shape_)) {
     throw Error(MAQ_ERROR_INTERNAL, "A gradient of a head's field is missing, or of another shape.");
@@ -302,12 +284,11 @@ bool FieldEngine::wants(const Sums& sums, int index) const {
   return false;
 }
 
-void FieldEngine::add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
-                                      bool has_bias) const {
+void FieldEngine::add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient,
+                                      const float* in) const {
   if (!wants(sums, index)) return;
   const FieldLayer to = sums.weights->layer(index);
-  kernels_->weight_gradient(gradient, outputs, in, to.inputs, to.stride, sums.transposed, to.weights,
-                            has_bias ? to.bias : nullptr);
+  kernels_->weight_gradient(gradient, outputs, in, to.inputs, to.stride, sums.transposed, to.weights, to.bias);
 }
 
 void FieldEngine::surface_backward(const Block& at, const Sums& sums, Scratch& scratch) const {
@@ -339,50 +320,11 @@ void FieldEngine::geometry_backward(const Block& at, const Sums& sums, int used,
   }
 }
 
-// A loss L(n) of the normal n, the gradient of the distance f by the point: with u = dL/dn held fast, L's gradient by
-// the weights is the gradient of u · n, which is the derivative of f as the point moves along u. So one tangent, along
-// u, is carried forwards through the geometry and differentiated backwards. The gradient by the activations' tangents
-// is the gradient of f by the activations, which forward() kept (slopes).
-void FieldEngine::run_tangents(const Block& at, const Scratch& scratch) const {
-  kernels_->encode_tangent(at.encoding, scratch.direction, shape_.octaves, scratch.tangents);
-  const float* in = scratch.tangents;
-  float* tangents = scratch.tangents + size_t(shape_.encoding()) * kBlock;
-  for (int i = 0; i < shape_.geometry_layers; ++i) {
-    float* out = hidden(tangents, i);
-    const Layer& to = layer(i);
-    kernels_->multiply(packed_.data() + to.forward, to.outputs, to.inputs, to.inputs, in, out);
-    kernels_->activation_tangent(hidden(at.geometry, i), shape_.width, shape_.smoothing, out, hidden(scratch.bends, i));
-    in = out;
-  }
-}
-
-void FieldEngine::tangents_backward(const Block& at, const Sums& sums, int used, bool to_input,
-                                    Scratch& scratch) const {
-  const int last = shape_.geometry_layers - 1, rows = shape_.width;
-  float* tangents = scratch.tangents + size_t(shape_.encoding()) * kBlock;
-  add_weight_gradient(sums, last + 1, used, scratch.a, hidden(at.geometry, last));
-  std::fill_n(scratch.c, kBlock, 1.0f);
-  add_weight_gradient(sums, last + 1, 1, scratch.c, hidden(tangents, last), false);
-  run_transposed(last + 1, used, scratch.a, scratch.b);
-  std::swap(scratch.a, scratch.b);
-  for (int i = last; i >= 0; --i) {
-    kernels_->activation_tangent_backward(hidden(at.geometry, i), hidden(scratch.bends, i), rows, shape_.smoothing,
-                                          hidden(at.slopes, i), scratch.a, scratch.c);
-    add_weight_gradient(sums, i, rows, scratch.a, i > 0 ? hidden(at.geometry, i - 1) : at.encoding);
-    add_weight_gradient(sums, i, rows, scratch.c, i > 0 ? hidden(tangents, i - 1) : scratch.tangents, false);
-    if (i == 0 && !to_input) return;
-    run_transposed(i, rows, scratch.a, scratch.b);
-    std::swap(scratch.a, scratch.b);
-  }
-  run_transposed(0, rows, scratch.c, scratch.b);
-  std::swap(scratch.b, scratch.c);
-}
-
 size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
                              FieldWeights* weights, const Planes& points_gradient) const {
   const bool has_surface = has_any(gradient.rgb) || has_any(gradient.template_point);
-  const bool has_normals = has_any(gradient.normal), to_points = has_any(points_gradient);
-  Scratch memory = scratch(workspace, has_normals);
+  const bool to_points = has_any(points_gradient);
+  Scratch memory = scratch(workspace);
   const Sums sums{which, weights, memory.transposed};
   check_backward(workspace, gradient, sums);
   size_t all_left_out = 0;
@@ -394,10 +336,6 @@ size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient
     std::array<float, kBlock> by_distance;
     take(gradient.distance, begin, count, by_distance.data());
     left_out |= not_finite(by_distance.data(), 1);
-    if (has_normals) {
-      take(gradient.normal, begin, count, memory.direction);
-      left_out |= not_finite(memory.direction, 3);
-    }
     if (has_surface) {
       take(gradient.rgb, begin, count, memory.a);
       take(gradient.template_point, begin, count, memory.a + 3 * kBlock);
@@ -405,7 +343,6 @@ size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient
       clear(left_out, memory.a, kSurfaceOutputs);
     }
     clear(left_out, by_distance.data(), 1);
-    clear(left_out, memory.direction, has_normals ? 3 : 0);
     all_left_out += count_of(left_out);
     std::fill_n(memory.points, 3 * kBlock, 0.0f);
     if (has_surface) {
@@ -417,33 +354,12 @@ size_t FieldEngine::backward(FieldWorkspace& workspace, const FieldValueGradient
       std::copy(by_distance.begin(), by_distance.end(), memory.a);
     }
     if (which == WeightGradient::kPersonalSurface && !to_points) continue;
-    if (has_normals) {
-      run_tangents(at, memory);
-      tangents_backward(at, sums, used, to_points, memory);
-    } else {
-      geometry_backward(at, sums, used, to_points, memory);
-    }
+    geometry_backward(at, sums, used, to_points, memory);
     if (!to_points) continue;
     kernels_->encode_backward(at.encoding, memory.a, shape_.octaves, memory.points);
-    if (has_normals) {
-      kernels_->encode_tangent_backward(at.encoding, memory.direction, memory.c, shape_.octaves, memory.points);
-    }
     put(memory.points, begin, count, points_gradient);
   }
   return all_left_out;
-}
-
-double eikonal_loss(size_t count, const ConstPlanes& g, float scale, const Planes& gradient) {
-  constexpr double kMax = std::numeric_limits<float>::max();
-  double sum = 0;
-  for (size_t i = 0; i < count; ++i) {
-    const double at[3] = {g[0][i], g[1][i], g[2][i]};
-    const double norm = std::sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
-    sum += (norm - 1) * (norm - 1);
-    const double factor = norm > 0 ? 2 * (norm - 1) / norm * double(scale) : 0.0;
-    for (size_t axis = 0; axis < 3; ++axis) gradient[axis][i] = float(std::clamp(factor * at[axis], -kMax, kMax));
-  }
-  return sum;
 }
 
 }  // namespace maq::head

@@ -38,7 +38,6 @@ struct FieldValueGradient {
   const float* distance = nullptr;
   ConstPlanes rgb{};
   ConstPlanes template_point{};
-  ConstPlanes normal{};
 };
 
 enum class WeightGradient {
@@ -58,14 +57,14 @@ class FieldWorkspace {
   AlignedFloats scratch_;           // of one block
   std::vector<uint64_t> left_out_;  // of each block that is kept: its points that have a value that is not finite
   size_t count_ = 0;                // of points that are kept
-  bool is_kept_ = false, has_surface_ = false, has_normals_ = false;
+  bool is_kept_ = false, has_surface_ = false;
 };
 
 // Calls are const and know no state but the workspace's, so that threads may share an engine. Results do not depend on
 // how points are split into batches, but for sums over points; these are in the order of the points.
 //
 // Nothing allocates once a workspace has seen a batch as large. A batch that backward() follows keeps some 2 KB a point
-// (width 64), 3 KB with normals, so that one of 256 points stays in a core's second cache.
+// (width 64), so that one of 256 points stays in a core's second cache.
 class FieldEngine {
  public:
   // Throws as check_field_shape() and field_kernels() do. Weights are 0.
@@ -84,11 +83,10 @@ class FieldEngine {
 
   // Keeps the values for backward() in the workspace, until the next call with this workspace.
   void forward(const FieldPoints& points, FieldWorkspace& workspace, const FieldValues& values) const;
-  // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). A gradient by
-  // the normal needs second derivatives: it costs as much again as the geometry's other part. May be called more than
-  // once. Points that have a value or a gradient that is not finite are left out: they have no part in the sums, and 0
-  // as their gradient; returns how many. Throws MAQ_ERROR_INTERNAL if forward() kept nothing, or did not compute a
-  // value with a given gradient.
+  // Adds to `weights` (may be null for kNone), writes the gradient by the points (null planes: left out). May be
+  // called more than once. Points that have a value or a gradient that is not finite are left out: they have no part in
+  // the sums, and 0 as their gradient; returns how many. Throws MAQ_ERROR_INTERNAL if forward() kept nothing, or
+  // did not compute a value with a given gradient.
   size_t backward(FieldWorkspace& workspace, const FieldValueGradient& gradient, WeightGradient which,
                   FieldWeights* weights, const Planes& points_gradient = {}) const;
 
@@ -97,14 +95,14 @@ class FieldEngine {
     size_t forward, backward, bias;  // in packed_
     int inputs, outputs;
   };
-  // Blocks of one call, within the workspace: of max_rows_ rows, of 3, and of tangents.
+  // Blocks of one call, within the workspace: of max_rows_ rows, and of 3.
   struct Scratch {
-    float *a, *b, *c, *transposed, *points, *direction, *tangents, *bends;
+    float *a, *b, *transposed, *points;
   };
-  // A block that is kept: rows of the encoding, of the hidden layers of the geometry, of the gradients of the distance
-  // by these (has_normals), of the input and the hidden layers of the surface (has_surface).
+  // A block that is kept: rows of the encoding, of the hidden layers of the geometry, of the input and the hidden
+  // layers of the surface (has_surface).
   struct Block {
-    float *encoding, *geometry, *slopes, *surface_input, *surface;
+    float *encoding, *geometry, *surface_input, *surface;
   };
   struct Sums {
     WeightGradient which;
@@ -112,10 +110,10 @@ class FieldEngine {
     float* transposed;
   };
 
-  Scratch scratch(FieldWorkspace& workspace, bool has_tangents) const;
+  Scratch scratch(FieldWorkspace& workspace) const;
   // Memory for so many points.
-  void keep(FieldWorkspace& workspace, size_t count, bool has_surface, bool has_normals) const;
-  size_t kept_rows(bool has_surface, bool has_normals) const;
+  void keep(FieldWorkspace& workspace, size_t count, bool has_surface) const;
+  size_t kept_rows(bool has_surface) const;
   Block block(FieldWorkspace& workspace, size_t begin) const;
 
   const Layer& layer(int index) const { return layers_[size_t(index)]; }
@@ -134,16 +132,12 @@ class FieldEngine {
 
   void check_backward(const FieldWorkspace& workspace, const FieldValueGradient& gradient, const Sums& sums) const;
   bool wants(const Sums& sums, int index) const;
-  void add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in,
-                           bool has_bias = true) const;
+  void add_weight_gradient(const Sums& sums, int index, int outputs, const float* gradient, const float* in) const;
   // Converts scratch.a from the gradient by the network's output to the gradient by its input.
   void surface_backward(const Block& at, const Sums& sums, Scratch& scratch) const;
   // From scratch.a, the gradient by what the output layer gave (of which `used` rows), to that by the encoding, unless
   // that is not asked for.
   void geometry_backward(const Block& at, const Sums& sums, int used, bool to_input, Scratch& scratch) const;
-  void run_tangents(const Block& at, const Scratch& scratch) const;
-  // The same with scratch.direction, the gradient by the normal; scratch.c gets the gradient by the encoding's tangent.
-  void tangents_backward(const Block& at, const Sums& sums, int used, bool to_input, Scratch& scratch) const;
 
   FieldShape shape_;
   FieldIsa isa_;
@@ -153,9 +147,5 @@ class FieldEngine {
   size_t distance_row_ = 0;  // in packed_: the geometry's output layer, without the feature
   size_t max_rows_ = 0, max_stride_ = 0;
 };
-
-// The eikonal term: the sum over points of (|g| - 1)², in double. Fills in its gradient by g times `scale`; where g is
-// 0 the norm's derivative is taken as 0. Finite for all finite g.
-double eikonal_loss(size_t count, const ConstPlanes& g, float scale, const Planes& gradient);
 
 }  // namespace maq::head

@@ -2,8 +2,7 @@
 // with their own flags. They include no header with functions that other sources could use: plain numbers only.
 //
 // Points lie in blocks of kFieldBlock columns: a matrix [rows][kFieldBlock] has a row for each input or output of a
-// layer. All memory is aligned to 64 bytes. A tangent is the derivative of such a matrix when each point moves along
-// its own vector.
+// layer. All memory is aligned to 64 bytes.
 #pragma once
 
 #include <cstddef>
@@ -16,14 +15,8 @@ struct FieldKernels {
   // points: [3][kFieldBlock] -> encoding [3 + 6 octaves][kFieldBlock], sines and cosines within 2e-7 for angles up to
   // 2,000. A point that is not finite is NaN in all rows that depend on it.
   void (*encode)(const float* points, int octaves, float* encoding);
-  // The change of the encoding when the points move along direction [3][kFieldBlock].
-  void (*encode_tangent)(const float* encoding, const float* direction, int octaves, float* tangent);
   // Adds the gradient by the points, from that by the encoding: [3][kFieldBlock].
   void (*encode_backward)(const float* encoding, const float* gradient, int octaves, float* points_gradient);
-
-  // The same from the gradient by the tangent of the encoding.
-  void (*encode_tangent_backward)(const float* encoding, const float* direction, const float* gradient, int octaves,
-                                  float* points_gradient);
 
   // Weights [rows][stride], of which `depth` columns, in the order of multiply(): rows * depth floats.
   void (*pack)(const float* weights, size_t stride, int rows, int depth, float* packed);
@@ -39,13 +32,6 @@ struct FieldKernels {
 
   // The gradient by the input of squareplus, from its output (out) and the gradient by the output.
   void (*activation_backward)(const float* out, int rows, float smoothing, const float* gradient, float* result);
-  // tangent: of the input -> of the output; bend gets a'' times the input's tangent.
-  void (*activation_tangent)(const float* out, int rows, float smoothing, float* tangent, float* bend);
-  // activation_backward() of both: by_tangent, from the gradient by the tangent to `result`, and in `gradient` that by
-  // the value, which has a part by the tangent's slope.
-  void (*activation_tangent_backward)(const float* out, const float* bend, int rows, float smoothing,
-                                      const float* by_tangent, float* gradient, float* result);
-
   // Adds gradient [outputs][block] · transpose of in [inputs][block] to weights [outputs][stride], and the sums of
   // gradient's rows to bias, unless that is null. scratch: kFieldBlock * stride floats.
   void (*weight_gradient)(const float* gradient, int outputs, const float* in, int inputs, size_t stride,

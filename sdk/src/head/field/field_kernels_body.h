@@ -174,7 +174,7 @@ void affine_activated(const float* packed, const float* bias, int rows, int dept
 // --- squareplus ------------------------------------------------------------------------------------------------------
 
 // From out = a(v) > 0: out (out - v) = b / 4, so 1 / sqrt(v v + b) = out / (out out + b / 4), and with that
-// a' = out / sqrt(v v + b), a'' = b / (2 sqrt(v v + b)^3).
+// a' = out / sqrt(v v + b).
 inline Vector inverse_root(Vector out, Vector quarter) { return out / multiply_add(out, out, quarter); }
 
 void activation_backward(const float* out, int rows, float smoothing, const float* gradient, float* result) {
@@ -182,25 +182,6 @@ void activation_backward(const float* out, int rows, float smoothing, const floa
   for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
     const Vector h = load(out + i);
     store(result + i, load(gradient + i) * (h * inverse_root(h, quarter)));
-  }
-}
-
-void activation_tangent(const float* out, int rows, float smoothing, float* tangent, float* bend) {
-  const Vector quarter = broadcast(0.25f * smoothing), half = broadcast(0.5f * smoothing);
-  for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
-    const Vector h = load(out + i), along = load(tangent + i), inverse = inverse_root(h, quarter);
-    store(bend + i, half * inverse * (inverse * inverse) * along);
-    store(tangent + i, h * inverse * along);
-  }
-}
-
-void activation_tangent_backward(const float* out, const float* bend, int rows, float smoothing,
-                                 const float* by_tangent, float* gradient, float* result) {
-  const Vector quarter = broadcast(0.25f * smoothing);
-  for (int i = 0; i < rows * kFieldBlock; i += kLanes) {
-    const Vector h = load(out + i), slope = h * inverse_root(h, quarter), by = load(by_tangent + i);
-    store(gradient + i, multiply_add(load(bend + i), by, slope * load(gradient + i)));
-    store(result + i, slope * by);
   }
 }
 
@@ -329,43 +310,6 @@ void encode(const float* points, int octaves, float* encoding) {
   }
 }
 
-void encode_tangent(const float* encoding, const float* direction, int octaves, float* tangent) {
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int column = 0; column < kFieldBlock; column += kLanes) {
-      const Vector along = load(direction + axis * kFieldBlock + column);
-      store(tangent + axis * kFieldBlock + column, along);
-      Vector turn = along;
-      for (int octave = 0; octave < octaves; ++octave) {
-        const Vector sine = load(encoding_row(encoding, octave, 0, axis) + column);
-        const Vector cosine = load(encoding_row(encoding, octave, 1, axis) + column);
-        store(encoding_row(tangent, octave, 0, axis) + column, turn * cosine);
-        store(encoding_row(tangent, octave, 1, axis) + column, -(turn * sine));
-        turn += turn;
-      }
-    }
-  }
-}
-
-void encode_tangent_backward(const float* encoding, const float* direction, const float* gradient, int octaves,
-                             float* points_gradient) {
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int column = 0; column < kFieldBlock; column += kLanes) {
-      Vector turn = load(direction + axis * kFieldBlock + column);
-      Vector sum{};
-      for (int octave = 0; octave < octaves; ++octave) {
-        const Vector by_sine = load(encoding_row(gradient, octave, 0, axis) + column);
-        const Vector by_cosine = load(encoding_row(gradient, octave, 1, axis) + column);
-        const Vector sine = load(encoding_row(encoding, octave, 0, axis) + column);
-        const Vector cosine = load(encoding_row(encoding, octave, 1, axis) + column);
-        sum = multiply_add(turn, multiply_add(sine, by_sine, cosine * by_cosine), sum);
-        turn *= broadcast(4.0f);
-      }
-      float* to = points_gradient + axis * kFieldBlock + column;
-      store(to, load(to) - sum);
-    }
-  }
-}
-
 void encode_backward(const float* encoding, const float* gradient, int octaves, float* points_gradient) {
   for (int axis = 0; axis < 3; ++axis) {
     for (int column = 0; column < kFieldBlock; column += kLanes) {
@@ -415,21 +359,9 @@ float dot(const float* a, const float* b, size_t count) {
   return total;
 }
 
-constexpr FieldKernels kKernels = {encode,
-                                   encode_tangent,
-                                   encode_backward,
-                                   encode_tangent_backward,
-                                   pack,
-                                   pack_transposed,
-                                   multiply,
-                                   affine,
-                                   affine_activated,
-                                   activation_backward,
-                                   activation_tangent,
-                                   activation_tangent_backward,
-                                   weight_gradient,
-                                   combine,
-                                   dot};
+constexpr FieldKernels kKernels = {
+    encode,          encode_backward, pack, pack_transposed, multiply, affine, affine_activated, activation_backward,
+    weight_gradient, combine,         dot};
 
 }  // namespace
 

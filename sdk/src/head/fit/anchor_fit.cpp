@@ -159,16 +159,10 @@ PoseStatus checked(const CameraPose& pose, const std::vector<Correspondence>& po
   return near > 0 ? pose.status : PoseStatus::kMirrored;
 }
 
-void check(const std::vector<HeadPhoto>& photos, const AnchorFitOptions& options) {
+void check(const std::vector<HeadPhoto>& photos) {
   if (photos.empty() || photos.size() > kMaxFitPhotos) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A head is to be fitted to ", photos.size(), " photos. Give 1 to ",
                 kMaxFitPhotos, ".");
-  }
-  const AnchorTermOptions& terms = options.terms;
-  for (const double value : {terms.cell_weight, terms.pixel_sigma, terms.limit, terms.max_anchor_dm}) {
-    if (!(value > 0 && value <= 1e6)) {
-      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "An option of the fit of a head is ", value, ". Give a positive number.");
-    }
   }
 }
 
@@ -191,7 +185,7 @@ size_t AnchorFit::used() const {
 }
 
 AnchorFit fit_anchors(const HeadPrior& prior, const std::vector<HeadPhoto>& photos, const AnchorFitOptions& options) {
-  check(photos, options);
+  check(photos);
   const AnchorPoints points(prior);
   AnchorFit result;
   result.shape_codes.assign(points.codes(), 0.0f);

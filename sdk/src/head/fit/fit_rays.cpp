@@ -60,7 +60,7 @@ Between cells_around(const HeadObservations& seen, double x, double y) {
 void observe(const Between& between, FitRay& ray) {
   bool is_known = true, is_head = true;
   double matte = 0, sigma = 0;
-  Vec3 point, normal;
+  Vec3 point;
   for (int k = 0; k < 4; ++k) {
     const HeadCell& cell = *between.cells[k];
     const double weight = between.weights[k];
@@ -70,16 +70,12 @@ void observe(const Between& between, FitRay& ray) {
     matte += weight * cell.matte;
     sigma += weight * cell.sigma_dm;
     point = point + weight * cell.template_point;
-    normal = normal + weight * cell.normal;
   }
   ray.matte = is_known ? float(matte) : std::numeric_limits<float>::quiet_NaN();
   ray.has_point = is_head;
   if (!is_head) return;
   ray.point[0] = float(point.x), ray.point[1] = float(point.y), ray.point[2] = float(point.z);
   ray.point_sigma_dm = float(sigma);
-  // Normals of different directions are no one normal.
-  const Vec3 unit = length(normal) > 0.5 ? normalized(normal) : Vec3{};
-  ray.normal[0] = float(unit.x), ray.normal[1] = float(unit.y), ray.normal[2] = float(unit.z);
 }
 
 // The mean of the crop's pixels in a square of it; false where one of them has no colour.

@@ -17,7 +17,6 @@ struct FitRay {
   float rgb[3] = {};    // 0..1, where has_colour
   float point[3] = {};  // of the template head, dm, where has_point
   float point_sigma_dm = 0;
-  float normal[3] = {};  // in the camera, of length 1; 0: not known
 };
 
 struct FitRays {
@@ -33,8 +32,8 @@ struct FitRayOptions {
 };
 
 // Adds the rays of a photo. Squares of 3x3 cells are held out, the same for any side_px: the next pixel over would
-// tell. The colour is the mean of the crop's pixels, and unknown on the mask's edge. Template points and normals are
-// interpolated between four cells of the head that agree with each other.
+// tell. The colour is the mean of the crop's pixels, and unknown on the mask's edge. Template points are interpolated
+// between four cells of the head that agree with each other.
 void add_fit_rays(const HeadPhoto& photo, uint32_t index, const FitRayOptions& options, FitRays& rays);
 
 }  // namespace maq::head

@@ -238,7 +238,7 @@ class Fitter {
     HeadLosses losses;
     const double weight = ray_weight(last_level_, held_out_.size());
     losses.colour = weight * sums.colour, losses.matte = weight * sums.matte;
-    losses.point = weight * sums.point, losses.normal = weight * sums.normal;
+    losses.point = weight * sums.point;
     add_priors(now_, losses, nullptr);
     const double best = best_losses_.total(), loss = losses.total();
     if (stats.checks == 1 || loss < best) {
@@ -379,58 +379,10 @@ class Fitter {
   std::vector<double> full_gradient_, change_;
 };
 
-void check(const HeadFitOptions& options) {
-  const auto require = [](bool is_good, const char* name, double value, const char* range) {
-    if (is_good) return;
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The ", name, " of a head's fit is ", value, ". Give ", range, ".");
-  };
-  require(options.seconds >= 0, "time in seconds", options.seconds, "0 or more");
-  require(options.max_steps >= 0 && options.max_steps <= 1000000, "number of steps", options.max_steps,
-          "0 to a million");
-  require(options.rays_per_step >= 1 && options.rays_per_step <= 65536, "number of rays a step", options.rays_per_step,
-          "1 to 65536");
-  for (const int side : {options.first_side_px, options.last_side_px}) {
-    require(side >= 8 && side <= 512, "number of pixels a row", side, "8 to 512");
-  }
-  require(options.check_steps >= 1, "number of steps between checks", options.check_steps, "1 or more");
-  require(options.patience >= 1, "patience", options.patience, "1 or more");
-  require(options.first_fraction >= 0 && options.first_fraction <= 1, "first level's fraction", options.first_fraction,
-          "0 to 1");
-  require(options.held_out_fraction >= 0 && options.held_out_fraction <= 0.5, "fraction of pixels held out",
-          options.held_out_fraction, "0 to 0.5");
-  require(options.min_gain >= 0, "smallest gain", options.min_gain, "0 or more");
-  const RayTermOptions& rays = options.rays;
-  for (const double weight : {rays.colour_weight, rays.matte_weight, rays.point_weight, rays.normal_weight,
-                              options.anchor_weight, options.shape_rate, options.colour_rate, options.camera_rate}) {
-    require(weight >= 0 && weight <= 1e6, "weight or rate", weight, "0 to a million");
-  }
-  for (const double sigma : {rays.colour_sigma, rays.point_sigma_dm, rays.normal_sigma, rays.limit}) {
-    require(sigma > 0 && sigma <= 1e6, "sigma or limit", sigma, "a positive number");
-  }
-  require(rays.matte_error_rate >= 0 && rays.matte_error_rate < 0.5, "rate of wrong mattes", rays.matte_error_rate,
-          "0 to less than 0.5");
-  require(rays.sections >= 1 && rays.sections <= 63, "number of sections", rays.sections, "1 to 63");
-}
-
 }  // namespace
-
-const char* head_fit_end_text(HeadFitEnd end) {
-  switch (end) {
-    case HeadFitEnd::kNoCamera:
-      return "No photo shows a head that a camera can be found for. The head is the mean one.";
-    case HeadFitEnd::kNoTime: return "The head is that of the encoder: there was no time for more.";
-    case HeadFitEnd::kSeconds: return "The time is over.";
-    case HeadFitEnd::kSteps: return "All steps are done.";
-    case HeadFitEnd::kNoGain: return "The pixels held out gain no more.";
-    case HeadFitEnd::kRefused: return "The steps made the head worse at any rate. It is the best that was found.";
-    case HeadFitEnd::kCancelled: return "The fit was cancelled. The head is the best that was found.";
-  }
-  return "";
-}
 
 HeadFit fit_head(const HeadPrior& prior, const std::vector<HeadPhoto>& photos, const HeadFitOptions& options,
                  WorkerThreads& threads, const HeadFitCallback& callback) {
-  check(options);
   const Stopwatch watch;
   HeadFit result{fit_anchors(prior, photos, options.anchors), {}, {}, FieldWeights(prior.bases.shape()), {}};
   result.codes.shape = result.start.shape_codes;

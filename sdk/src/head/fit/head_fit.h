@@ -49,14 +49,11 @@ enum class HeadFitEnd {
   kCancelled,  // by the callback
 };
 
-// A sentence for the log.
-const char* head_fit_end_text(HeadFitEnd end);
-
 // Terms of the whole objective, estimated from the held-out pixels; anchors, prior and focal are exact.
 struct HeadLosses {
-  double colour = 0, matte = 0, point = 0, normal = 0, anchors = 0, prior = 0;
+  double colour = 0, matte = 0, point = 0, anchors = 0, prior = 0;
 
-  double total() const { return colour + matte + point + normal + anchors + prior; }
+  double total() const { return colour + matte + point + anchors + prior; }
 };
 
 struct HeadFitStats {
@@ -93,7 +90,7 @@ struct HeadFit {
 // Deterministic for options, as long as it is not time that ends it; the same for any number of threads. Memory grows
 // with the photos (some 3 MB each), not with the steps. A step after which a number is not finite, or the loss far
 // higher, is refused: the best head so far is taken up again with half the rates.
-// Throws as fit_anchors() does, and MAQ_ERROR_INVALID_ARGUMENT for options that are not finite or out of range.
+// Throws as fit_anchors() does.
 HeadFit fit_head(const HeadPrior& prior, const std::vector<HeadPhoto>& photos, const HeadFitOptions& options,
                  WorkerThreads& threads, const HeadFitCallback& callback = {});
 

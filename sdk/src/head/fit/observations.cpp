@@ -30,19 +30,12 @@ bool is_inside(const HeadCell& cell, int width_px, int height_px) {
          (height_px <= 0 || (cell.y_px >= -0.5 && cell.y_px < height_px - 0.5));
 }
 
-// Converts from the axes of the crop to the axes of the photo.
-Vec3 turned(const AffineMap& map, Vec3 n) {
-  const double scale = 1 / std::sqrt(map.xx * map.yy - map.xy * map.yx);
-  return normalized({scale * (map.xx * n.x + map.xy * n.y), scale * (map.yx * n.x + map.yy * n.y), n.z});
-}
-
-bool read_cell(const float* from, const AffineMap& map, HeadCell& cell) {
+bool read_cell(const float* from, HeadCell& cell) {
   if (!std::all_of(from, from + kCellChannels, [](float value) { return std::isfinite(value); })) return false;
   if (!std::all_of(from, from + 3, [](float value) { return std::abs(double(value)) <= kMaxReach_dm; })) return false;
   cell.template_point = {double(from[0]), double(from[1]), double(from[2])};
   cell.sigma_dm = std::exp(std::clamp(double(from[3]), kMinLogSigma, kMaxLogSigma));
   cell.matte = 1 / (1 + std::exp(-double(from[4])));
-  cell.normal = turned(map, {double(from[5]), double(from[6]), double(from[7])});
   return true;
 }
 
@@ -62,7 +55,7 @@ HeadObservations read_observations(const float* cells, const CellGrid& grid, con
     const int row = int(i) / grid.side, column = int(i) % grid.side;
     const Point at = crop_to_photo({(column + 0.5) * grid.cell_px, (row + 0.5) * grid.cell_px});
     cell.x_px = at.x - 0.5, cell.y_px = at.y - 0.5;
-    cell.is_usable = is_inside(cell, width_px, height_px) && read_cell(cells + i * kCellChannels, crop_to_photo, cell);
+    cell.is_usable = is_inside(cell, width_px, height_px) && read_cell(cells + i * kCellChannels, cell);
     if (cell.is_usable) {
       seen.cells[i] = cell;
     } else {

@@ -21,7 +21,6 @@ struct HeadCell {
   Vec3 template_point;        // dm, in the template head's frame
   double sigma_dm = 0;
   double matte = 0;  // 0..1: how much of it is the head
-  Vec3 normal;       // of length 1, in the axes of the photo's camera; 0 where the encoder gave none
 };
 
 struct HeadObservations {

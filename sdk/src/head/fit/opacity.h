@@ -1,7 +1,6 @@
-// How opaque a ray is along its sections: NeuS (arXiv 2106.10689, equation 13) in its log form, with all derivatives.
+// How opaque a ray is along its sections: NeuS (arXiv 2106.10689, equation 13) in its log form, with its derivatives.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -18,42 +17,20 @@ class RayOpacity {
   // `sharpness` is positive and finite.
   void run(const float* distances, size_t sections, double sharpness);
 
-  // [sections]: the transmittance before each times its alpha.
-  const std::vector<float>& weights() const { return weights_; }
   // Log transmittance of the whole ray, at most 0; never -infinity with finite distances.
   double log_transmittance() const { return log_transmittance_; }
-  double opacity() const;  // the sum of the weights
 
-  // Converts the loss's derivatives by each weight and by log_transmittance() to derivatives by each distance
-  // (`by_distances` [sections + 1], overwritten) and by the sharpness (added). Of the latest run.
-  void back(const float* by_weights, double by_log_transmittance, float* by_distances, double& by_sharpness) const;
-
-  // All of the ray is so far outside that nothing of it is left in double: weights and derivatives are 0 without work.
-  bool is_clear() const { return is_clear_; }
+  // Writes the loss's derivatives by each distance (`by_distances` [sections + 1]) from its derivative by
+  // log_transmittance(). For the latest run.
+  void back(double by_log_transmittance, float* by_distances) const;
 
  private:
   double sharpness_ = 1;
   double log_transmittance_ = 0;
-  bool is_clear_ = true;
-  std::vector<float> weights_;
+  bool is_clear_ = true;  // so far outside that nothing of the ray is left in double: there is no work
+  size_t sections_ = 0;
   std::vector<double> distances_, inside_;  // of ends; inside: sigmoid(-s f)
-  std::vector<double> log_clear_, after_;   // of sections: log(1 - alpha), transmittance behind it
+  std::vector<double> log_clear_;           // of sections: log(1 - alpha)
 };
-
-// The colour of a ray: the sum of weights times colours [sections][3]. The caller adds the background.
-std::array<float, 3> blend_colours(const std::vector<float>& weights, const float* colours);
-
-// Converts the loss's derivative by that colour to derivatives by the colours (overwritten) and by the weights (added).
-void blend_colours_back(const std::vector<float>& weights, const float* colours, const std::array<float, 3>& by_colour,
-                        float* by_colours, float* by_weights);
-
-// Cross entropy of a ray's opacity with the matte (0..1) of its pixel. Logarithms end at -100, with a derivative of 0
-// there; `is_clamped` says so where it counts. A matte that is not a number has no loss and is clamped.
-struct MatteTerm {
-  double loss = 0;
-  double by_log_transmittance = 0;
-  bool is_clamped = false;
-};
-MatteTerm matte_cross_entropy(double log_transmittance, double matte);
 
 }  // namespace maq::head

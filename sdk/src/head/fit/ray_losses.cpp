@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "head/fit/opacity.h"
-
 namespace maq::head {
 namespace {
 
@@ -47,24 +45,7 @@ ThreeLoss template_loss(const float* point, const float* observed, double sigma_
   return result;
 }
 
-NormalLoss normal_loss(Vec3 gradient, const Mat3& rotation, Vec3 observed, double sigma, double limit) {
-  NormalLoss result;
-  const double norm = length(gradient);
-  if (!(norm > 0)) return result;
-  const Vec3 n = (1 / norm) * (rotation * gradient), off = (1 / sigma) * (n - observed);
-  const Robust at = robust(dot(off, off), limit);
-  result.loss = at.loss;
-  const Vec3 by_n = (at.slope * 2 / sigma) * off;
-  result.by_turn = cross(n, by_n);
-  result.by_gradient = (1 / norm) * (transposed(rotation) * (by_n - dot(by_n, n) * n));
-  return result;
-}
-
 OpacityLoss matte_loss(double log_transmittance, double matte, double error_rate) {
-  if (!(error_rate > 0)) {
-    const MatteTerm term = matte_cross_entropy(log_transmittance, matte);
-    return {term.loss, term.by_log_transmittance};
-  }
   if (std::isnan(matte) || std::isnan(log_transmittance)) return {};
   const double clear = std::min(log_transmittance, 0.0), m = std::clamp(matte, 0.0, 1.0);
   const double right = 1 - 2 * error_rate, transmittance = std::exp(clear);

@@ -2,9 +2,6 @@
 // costs 1/2 e / (1 + e / limit) (Geman-McClure): a large error no longer pulls.
 #pragma once
 
-#include "core/math/vec3.h"
-#include "head/camera/se3.h"
-
 namespace maq::head {
 
 struct ThreeLoss {
@@ -18,18 +15,9 @@ ThreeLoss colour_loss(const float* logits, const float* rgb, double sigma, doubl
 // Loss of two points of the template head with this sigma (dm) in each coordinate; derivative by the first point.
 ThreeLoss template_loss(const float* point, const float* observed, double sigma_dm, double limit);
 
-// The normal that the camera sees, rotation g / |g| of the distance's gradient g, against one of length 1; each
-// coordinate with this sigma. A gradient of 0 has no loss.
-struct NormalLoss {
-  double loss = 0;
-  Vec3 by_gradient;  // by g
-  Vec3 by_turn;      // by w, where the rotation is exp_rotation(w) rotation
-};
-NormalLoss normal_loss(Vec3 gradient, const Mat3& rotation, Vec3 observed, double sigma, double limit);
-
 // Cross entropy of the opacity 1 - e^log_transmittance with a matte in 0..1, of which a fraction `error_rate` is wrong
-// whatever it says: so a wrong one costs -log error_rate at most, and pulls at nothing far away. With a rate of 0 it is
-// matte_cross_entropy(). A matte that is not a number has no loss.
+// whatever it says: so a wrong one costs -log error_rate at most, and pulls at nothing far away. A matte that is not a
+// number has no loss.
 struct OpacityLoss {
   double loss = 0;
   double by_log_transmittance = 0;

@@ -42,7 +42,7 @@ Vec3 get(const std::array<std::vector<float>, 3>& columns, size_t i) {
 }  // namespace
 
 void RaySums::add(const RaySums& other) {
-  colour += other.colour, matte += other.matte, point += other.point, normal += other.normal;
+  colour += other.colour, matte += other.matte, point += other.point;
   rays += other.rays, hits += other.hits, coloured += other.coloured, left_out += other.left_out;
 }
 
@@ -151,7 +151,6 @@ void RayTerms::run_mattes(const Call& call, Track* tracks, size_t count, FieldPa
   }
   call.engine.distances(as_points(scratch.points, count * samples), part.workspace, scratch.distances.data());
   scratch.samples.clear();
-  const std::vector<float> by_weights(sections, 0.0f);
   std::vector<float> pulls;
   for (size_t i = 0; i < count; ++i) {
     Track& track = tracks[i];
@@ -176,8 +175,7 @@ void RayTerms::run_mattes(const Call& call, Track* tracks, size_t count, FieldPa
     scratch.sums.matte += options_.matte_weight * loss.loss;
     const double pull = options_.matte_weight * loss.by_log_transmittance;
     if (!call.has_gradient || pull == 0) continue;
-    double by_sharpness = 0;
-    scratch.opacity.back(by_weights.data(), pull, scratch.by_distances.data(), by_sharpness);
+    scratch.opacity.back(pull, scratch.by_distances.data());
     for (size_t k = 0; k < samples; ++k) {
       const double by_distance = double(scratch.by_distances[k]);
       if (!(std::abs(by_distance) > kMinPull)) continue;
@@ -199,9 +197,8 @@ void RayTerms::run_mattes(const Call& call, Track* tracks, size_t count, FieldPa
   }
   scratch.distances.resize(std::max(scratch.distances.size(), pulled));
   call.engine.forward(as_points(scratch.points, pulled), part.workspace, {scratch.distances.data(), {}, {}, {}});
-  scratch.sums.left_out +=
-      call.engine.backward(part.workspace, {pulls.data(), {}, {}, {}}, WeightGradient::kPersonalGeometry,
-                           &part.gradient, planes(scratch.moved));
+  scratch.sums.left_out += call.engine.backward(
+      part.workspace, {pulls.data(), {}, {}}, WeightGradient::kPersonalGeometry, &part.gradient, planes(scratch.moved));
   for (size_t j = 0; j < pulled; ++j) {
     const Track& track = tracks[scratch.samples[j].ray];
     track.pose->add_gradient(double(track.ray->x_px), double(track.ray->y_px), scratch.samples[j].depth,
@@ -244,8 +241,8 @@ void RayTerms::refine_hits(const Call& call, Track* tracks, size_t count, FieldP
 void RayTerms::run_surface(const Call& call, const Track* tracks, size_t count, FieldParts::Part& part,
                            Scratch& scratch) const {
   resize(scratch.points, count);
-  for (Columns* columns : {&scratch.normals, &scratch.logits, &scratch.templates, &scratch.by_normals,
-                           &scratch.by_logits, &scratch.by_templates, &scratch.moved}) {
+  for (Columns* columns : {&scratch.normals, &scratch.logits, &scratch.templates, &scratch.by_logits,
+                           &scratch.by_templates, &scratch.moved}) {
     resize(*columns, count);
     for (std::vector<float>& column : *columns) std::fill(column.begin(), column.end(), 0.0f);
   }
@@ -265,17 +262,6 @@ void RayTerms::run_surface(const Call& call, const Track* tracks, size_t count, 
       const ThreeLoss loss = template_loss(at, ray.point, sigma, options_.limit);
       scratch.sums.point += options_.point_weight * loss.loss;
       for (size_t c = 0; c < 3; ++c) scratch.by_templates[c][i] = float(options_.point_weight * loss.by[c]);
-      const Vec3 seen = {double(ray.normal[0]), double(ray.normal[1]), double(ray.normal[2])};
-      if (dot(seen, seen) > 0) {
-        const NormalLoss turned =
-            normal_loss(normal, tracks[i].pose->rotation(), seen, options_.normal_sigma, options_.limit);
-        scratch.sums.normal += options_.normal_weight * turned.loss;
-        set(scratch.by_normals, i, options_.normal_weight * turned.by_gradient);
-        double* by_pose = scratch.by_poses[ray.photo].data();
-        by_pose[0] += options_.normal_weight * turned.by_turn.x;
-        by_pose[1] += options_.normal_weight * turned.by_turn.y;
-        by_pose[2] += options_.normal_weight * turned.by_turn.z;
-      }
     }
     if (ray.has_colour) {
       const float at[3] = {scratch.logits[0][i], scratch.logits[1][i], scratch.logits[2][i]};
@@ -290,14 +276,12 @@ void RayTerms::run_surface(const Call& call, const Track* tracks, size_t count, 
 
 void RayTerms::surface_back(const Call& call, const Track* tracks, FieldParts::Part& part, Scratch& scratch) const {
   const size_t count = scratch.points[0].size();
-  const ConstPlanes by_logits = const_planes(scratch.by_logits);
   const size_t left_out =
-      call.engine.backward(part.workspace,
-                           {nullptr, options_.colour_moves_surface ? by_logits : ConstPlanes{},
-                            const_planes(scratch.by_templates), const_planes(scratch.by_normals)},
+      call.engine.backward(part.workspace, {nullptr, {}, const_planes(scratch.by_templates)},
                            WeightGradient::kPersonalGeometry, &part.gradient, planes(scratch.moved));
   scratch.sums.left_out += left_out;
-  call.engine.backward(part.workspace, {nullptr, by_logits, {}, {}}, WeightGradient::kPersonalSurface, &part.gradient);
+  call.engine.backward(part.workspace, {nullptr, const_planes(scratch.by_logits), {}}, WeightGradient::kPersonalSurface,
+                       &part.gradient);
   // The surface's point stays on the surface.
   scratch.by_distances.assign(count, 0.0f);
   for (size_t i = 0; i < count; ++i) {
@@ -310,7 +294,7 @@ void RayTerms::surface_back(const Call& call, const Track* tracks, FieldParts::P
     track.pose->add_gradient(double(track.ray->x_px), double(track.ray->y_px), track.depth,
                              by_point + by_distance * normal, scratch.by_poses[track.ray->photo].data());
   }
-  call.engine.backward(part.workspace, {scratch.by_distances.data(), {}, {}, {}}, WeightGradient::kPersonalGeometry,
+  call.engine.backward(part.workspace, {scratch.by_distances.data(), {}, {}}, WeightGradient::kPersonalGeometry,
                        &part.gradient);
 }
 

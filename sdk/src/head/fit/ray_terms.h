@@ -1,7 +1,7 @@
 // How well a head explains the pixels of its photos, along rays, with the gradient by its codes and cameras.
 //
-// The matte is compared with the opacity of sections around where the ray goes in, or passes nearest. Template point,
-// normal and colour are those of the point p where it goes in: on the ray p = o + t d, so where the distance f changes
+// The matte is compared with the opacity of sections around where the ray goes in, or passes nearest. Template point
+// and colour are those of the point p where it goes in: on the ray p = o + t d, so where the distance f changes
 // there by df, or o and d change, p moves along d by -(df + grad f . (do + t dd)) / (grad f . d), and with it what is
 // seen there (implicit differentiation, as in IDR, arXiv 2003.09852).
 #pragma once
@@ -20,27 +20,24 @@
 
 namespace maq::head {
 
-// Each term is a negative log likelihood a ray, with the noise that is named here, times its weight.
+// Each term is a negative log likelihood a ray, with the noise that is named here, times its weight. Colours move the
+// colour codes alone: light and shadows are no shape. The encoder's normals have no term: they err by some 16 degrees,
+// alike over whole cheeks, and without them held-out heads are nearer.
 struct RayTermOptions {
   double colour_weight = 1, matte_weight = 1, point_weight = 1;
-  // The encoder errs by some 16 degrees, alike over whole cheeks: without its normals held-out heads are nearer.
-  double normal_weight = 0;
   double colour_sigma = 0.12;      // of 0..1, each channel: mostly light that the prior does not know
   double matte_error_rate = 0.05;  // the fraction of mattes that say nothing
   double point_sigma_dm = 0.03;    // of the field's template points, beside the encoder's own
-  double normal_sigma = 0.35;      // each coordinate of a normal of length 1
   double limit = 9;                // in squared sigmas: the limit of a robust error
-  // By default colours move the colour codes alone: light and shadows are no shape.
-  bool colour_moves_surface = false;
   int sections = 12;
 };
 
 struct RaySums {
-  double colour = 0, matte = 0, point = 0, normal = 0;  // weighted
+  double colour = 0, matte = 0, point = 0;  // weighted
   size_t rays = 0, hits = 0, coloured = 0;
   size_t left_out = 0;  // points whose numbers are not finite
 
-  double total() const { return colour + matte + point + normal; }
+  double total() const { return colour + matte + point; }
   void add(const RaySums& other);
 };
 
@@ -74,7 +71,7 @@ class RayTerms {
   struct Scratch {
     RaySums sums;
     std::vector<std::array<double, kPoseUnknowns>> by_poses;
-    Columns points, moved, normals, logits, templates, by_normals, by_logits, by_templates;
+    Columns points, moved, normals, logits, templates, by_logits, by_templates;
     std::vector<float> distances, by_distances;
     std::vector<Sample> samples;
     RayOpacity opacity;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "core/error.h"
@@ -17,13 +16,9 @@ constexpr float kUnit = 1 << 30;  // the weight of the likeliest
 
 }  // namespace
 
-CodeSampler::CodeSampler(const SamplingSettings& settings, size_t entries)
-    : settings_(settings), weights_(entries), sorted_(entries) {
+CodeSampler::CodeSampler(const SamplingSettings& settings, size_t entries) : settings_(settings), weights_(entries) {
   if (!(settings.temperature >= 0)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The temperature is ", settings.temperature, ", but must be 0 or more.");
-  }
-  if (settings.top_k > entries) {
-    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "top_k is ", settings.top_k, ", but must be 0 to ", entries, ".");
   }
 }
 
@@ -34,7 +29,7 @@ uint16_t CodeSampler::sample(const float* logits, const SamplePosition& position
     throw Error(MAQ_ERROR_INFERENCE, "The transformer returned NaN. Install the bundle again.");
   }
   const auto likeliest = uint16_t(std::find(logits, logits + entries, largest) - logits);  // the first of equals
-  if (temperature == 0 || settings_.top_k == 1) return likeliest;
+  if (temperature == 0) return likeliest;
 
   if (std::isinf(largest)) {  // uniform over the +infinite ones, or over all if all are -infinite
     std::transform(logits, logits + entries, weights_.begin(), [&](float l) { return l == largest ? kUnit : 0.0f; });
@@ -44,22 +39,6 @@ uint16_t CodeSampler::sample(const float* logits, const SamplePosition& position
     likelihood_weights(logits, entries, largest, temperature, weights_.data());
     for (float& weight : weights_) weight *= kUnit;
   }
-  if (settings_.top_k > 1 && settings_.top_k < entries) {
-    std::copy_n(logits, entries, sorted_.begin());
-    const auto last = sorted_.begin() + std::ptrdiff_t(settings_.top_k - 1);
-    std::nth_element(sorted_.begin(), last, sorted_.end(), std::greater<>());
-    const float limit = *last;
-    size_t left = settings_.top_k - size_t(std::count_if(logits, logits + entries, [&](float l) { return l > limit; }));
-    for (size_t i = 0; i < entries; ++i) {
-      if (logits[i] > limit) continue;
-      if (logits[i] == limit && left > 0) {
-        --left;
-      } else {
-        weights_[i] = 0;
-      }
-    }
-  }
-
   uint64_t total = 0;
   for (const float weight : weights_) total += uint32_t(int32_t(weight));
   const std::array<uint32_t, 4> words =

@@ -10,7 +10,6 @@ namespace maq {
 
 struct SamplingSettings {
   float temperature = 1;  // 0: the likeliest code, the lowest of equals; infinite: uniform
-  size_t top_k = 0;       // samples from this many likeliest codes; 0: all
   uint64_t seed = 0;
 };
 
@@ -24,8 +23,7 @@ struct SamplePosition {
 // Not for two threads at once.
 class CodeSampler {
  public:
-  // `entries`: at most kMaxCodeEntries. Throws MAQ_ERROR_INVALID_ARGUMENT for a temperature that is negative or NaN,
-  // and for a top_k above `entries`.
+  // `entries`: at most kMaxCodeEntries. Throws MAQ_ERROR_INVALID_ARGUMENT for a temperature that is negative or NaN.
   CodeSampler(const SamplingSettings& settings, size_t entries);
 
   // Infinite logits are equally likely. Throws MAQ_ERROR_INFERENCE if a logit is NaN.
@@ -33,7 +31,7 @@ class CodeSampler {
 
  private:
   const SamplingSettings settings_;
-  std::vector<float> weights_, sorted_;
+  std::vector<float> weights_;
 };
 
 }  // namespace maq

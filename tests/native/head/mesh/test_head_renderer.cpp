@@ -225,31 +225,5 @@ TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
   expect_error(MAQ_ERROR_UNSUPPORTED, "no surface", [] { HeadRenderer({}, std::nullopt, {}); });
 }
 
-TEST(HeadRenderer, TwoInTwoThreadsDrawWhatOneThreadDraws) {
-  HeadRenderOptions options = with_shading(MeshShading::kColour);
-  options.threads = 1;
-  const auto turned = [&](HeadRenderer& renderer, int step, RenderedImage& picture) {
-    renderer.render(renderer.orbit_camera(0.7 * step, 0.1 * step, 120 + step, 90), picture);
-  };
-  std::vector<RenderedImage> expected(6);
-  HeadRenderer one(ball_mesh(0.05f), std::nullopt, options);
-  for (int step = 0; step < 6; ++step) turned(one, step, expected[size_t(step)]);
-  const auto run = [&] {
-    HeadRenderOptions two = options;
-    two.threads = 2;
-    HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, two);
-    RenderedImage picture;
-    for (int step = 0; step < 6; ++step) {
-      turned(renderer, step, picture);
-      EXPECT_EQ(picture.bgr, expected[size_t(step)].bgr);
-      EXPECT_EQ(picture.depth, expected[size_t(step)].depth);
-      EXPECT_EQ(picture.alpha, expected[size_t(step)].alpha);
-    }
-  };
-  std::thread other(run);
-  run();
-  other.join();
-}
-
 }  // namespace
 }  // namespace head_renderer_tests

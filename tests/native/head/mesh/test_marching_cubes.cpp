@@ -246,16 +246,6 @@ TEST(MarchingCubes, ASteeperFieldThanToldLeavesNothingOpen) {
   EXPECT_EQ(mesh.vertex_count(), marching_cubes(ball(1, 3), options, threads).vertex_count());
 }
 
-TEST(MarchingCubes, TwoThreadsMakeTheMeshOfOne) {
-  WorkerThreads one(1), two(2);
-  MarchingCubesOptions options;
-  options.cell = 0.03f;
-  const HeadMesh a = marching_cubes(ball(1.1f, 1, 0.2f), options, one);
-  const HeadMesh b = marching_cubes(ball(1.1f, 1, 0.2f), options, two);
-  EXPECT_EQ(a.positions, b.positions);
-  EXPECT_EQ(a.triangles, b.triangles);
-}
-
 TEST(MarchingCubes, GridsThatAreTooLargeOrWrongAreRefused) {
   WorkerThreads threads(1);
   const auto refuse = [&](maq_status status, const char* text, MarchingCubesOptions options) {

@@ -137,18 +137,4 @@ TEST(MeshRaster, WhatIsDegenerateOrBehindIsSkipped) {
   EXPECT_GT(std::count(image.alpha.begin(), image.alpha.end(), 255), 20);
 }
 
-TEST(MeshRaster, CamerasThatCannotBeAreRefused) {
-  WorkerThreads threads(1);
-  MeshRaster raster;
-  RenderedImage image;
-  HeadCamera camera = front(0, 10);
-  expect_error(MAQ_ERROR_IMAGE_SIZE, "0x10 pixels", [&] { raster.draw({}, camera, {}, threads, image); });
-  camera = front(10, 10);
-  camera.head_to_camera.translation.y = std::nan("");
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "not finite", [&] { raster.draw({}, camera, {}, threads, image); });
-  camera = front(10, 10);
-  camera.focal_px = -1;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "focal length of -1", [&] { raster.draw({}, camera, {}, threads, image); });
-}
-
 }  // namespace

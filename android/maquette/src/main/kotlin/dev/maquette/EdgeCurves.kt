@@ -13,30 +13,15 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
     /**
      * Settings of the curve search. The defaults suit all cameras and scenes, because lengths are in pixels.
      *
-     * @property voteRadiusPx pixels nearer than this to an edge vote for its position.
-     * @property minVotes votes an edge needs; 1 is the sum of all votes from one side of an edge.
-     * @property flyingPixelBandPx half-width of the band of mixed (flying) pixels along an edge.
-     * @property fitBandPx width of the band beyond it to which surfaces are fitted; three times as wide in noise.
-     * @property splitAngleDegrees a curve that turns by more than this at one point is split.
      * @property minLengthPx shorter curves are dropped.
      * @property skipBoxes true: do not search for boxes.
      */
     data class Config(
-        val voteRadiusPx: Float = 4f,
-        val minVotes: Float = 0.35f,
-        val flyingPixelBandPx: Float = 3f,
-        val fitBandPx: Float = 8f,
-        val splitAngleDegrees: Float = 15f,
         val minLengthPx: Float = 10f,
         val skipBoxes: Boolean = false,
     ) {
         internal fun native() =
             maq_edges_curves_config().also {
-                it.vote_radius_px = voteRadiusPx
-                it.min_votes = minVotes
-                it.flying_pixel_band_px = flyingPixelBandPx
-                it.fit_band_px = fitBandPx
-                it.split_angle_deg = splitAngleDegrees
                 it.min_length_px = minLengthPx
                 it.skip_boxes = skipBoxes.toInt()
             }

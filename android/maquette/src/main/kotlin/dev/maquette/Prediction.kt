@@ -45,7 +45,6 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      * @property method [Method.REFINED] and [Method.SAMPLED] need a bundle.
      * @property framePoolSize predicted frames that the app may hold at once, 1 to 64; 0: 4.
      * @property temperature of [Method.SAMPLED]: 0 takes the likeliest code; 1 samples by the probabilities.
-     * @property topK of [Method.SAMPLED]: samples only from this many likeliest codes; 0: from all.
      * @property seed of [Method.SAMPLED]: equal seeds give equal frames on one processor.
      */
     data class Config(
@@ -53,7 +52,6 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
         val method: Method = Method.AUTO,
         val framePoolSize: Int = 4,
         val temperature: Float = 0f,
-        val topK: Int = 0,
         val seed: Long = 0,
     ) {
         internal fun native(bundle: ModelBundle?) =
@@ -62,7 +60,6 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
                 it.method = method.code
                 it.frame_pool_size = framePoolSize
                 it.temperature = temperature
-                it.top_k = topK
                 it.seed = seed
             }
     }

@@ -378,14 +378,9 @@ internal class maq_edges_curve(outer: Memory? = null, at: Int = 0) : Struct(232,
     val points_m get() = Pointer(this, 48); val point_count get() = int(56); val centre_m get() = doubles(72, 3)
 }
 
-internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    var vote_radius_px: Float get() = float(4); set(v) = float(4, v)
-    var min_votes: Float get() = float(8); set(v) = float(8, v)
-    var flying_pixel_band_px: Float get() = float(12); set(v) = float(12, v)
-    var fit_band_px: Float get() = float(16); set(v) = float(16, v)
-    var split_angle_deg: Float get() = float(20); set(v) = float(20, v)
-    var min_length_px: Float get() = float(24); set(v) = float(24, v)
-    var skip_boxes: Int get() = int(28); set(v) = int(28, v)
+internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {
+    var min_length_px: Float get() = float(4); set(v) = float(4, v)
+    var skip_boxes: Int get() = int(8); set(v) = int(8, v)
 }
 
 internal class maq_edges_curves_stats(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
@@ -544,8 +539,7 @@ internal class maq_predictor_config(outer: Memory? = null, at: Int = 0) : Struct
     val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
     var frame_pool_size: Int get() = int(44); set(v) = int(44, v)
     var temperature: Float get() = float(48); set(v) = float(48, v)
-    var top_k: Int get() = int(52); set(v) = int(52, v); var seed: Long get() = long(56); set(v) = long(56, v)
-    var shared_with: Long get() = long(64); set(v) = long(64, v)
+    var seed: Long get() = long(56); set(v) = long(56, v); var shared_with: Long get() = long(64); set(v) = long(64, v)
 }
 
 internal class maq_predictor_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {

@@ -80,7 +80,7 @@ def test_a_section_that_is_measured_again_leaves_nothing_of_the_run_before():
 def test_each_shipped_target_has_a_metric_and_the_other_way_round():
     names = {"fps_one_person", "fps_four_people", "fps_empty", "bundle_mb", "peak_memory_mb", "first_result_ms",
              "int8_gps_loss_points", "int8_label_agreement", "time_by_openvino_int8", "time_by_pytorch_fp32",
-             "roofline_fraction", *startup.METRICS, *sizes.METRICS, *ui_latency.METRICS, *cameras.METRICS,
+             "roofline_fraction", *startup.METRICS, *sizes.METRICS.values(), *ui_latency.METRICS, *cameras.METRICS,
              *scenes.METRICS, *edges.METRICS, *prediction.METRICS}  # fmt: skip
     assert {verdict.metric for verdict in targets.check(dict.fromkeys(names, 1.0), MACHINE, {})} == names
 

@@ -1,6 +1,7 @@
 #include "prediction_view.h"
 
 #include <GLFW/glfw3.h>
+#include <app/tiling.h>
 #include <imgui.h>
 #include <algorithm>
 #include <cmath>
@@ -17,25 +18,6 @@ constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // drags and arrows turn something in other views
 constexpr Reddening kNoveltyRed = {1, 8, 0.7f}, kEntropyRed = {1, 6, 0.6f};
 constexpr ImU32 kPredictedColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
-
-struct Tiling {
-  int columns = 0, rows = 0;
-  int width = 0, height = 0;  // of an image
-};
-
-// As large as `count` images of `picture_width` : `picture_height` get in an area.
-Tiling tile(int count, int area_width, int area_height, int picture_width, int picture_height) {
-  Tiling best;
-  for (int columns = count; columns >= 1; --columns) {
-    const int rows = (count + columns - 1) / columns;
-    const int cell_width = area_width / columns, cell_height = area_height / rows;
-    const double scale =
-        std::min(double(cell_width) / std::max(1, picture_width), double(cell_height) / std::max(1, picture_height));
-    const int width = int(picture_width * scale + 0.5);
-    if (width > best.width) best = {columns, rows, width, int(picture_height * scale + 0.5)};
-  }
-  return best;
-}
 
 }  // namespace
 
@@ -90,8 +72,8 @@ void PredictionView::steer(const Steering& steering, const Rect&) {
 void PredictionView::place(Rect area) {
   const int curve_height = choice_.scores_novelty ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
   area.height -= curve_height;
-  const Tiling one =
-      tile(choice_.shows_sample ? 3 : 2, area.width, area.height, frame().now.width_px, frame().now.height_px);
+  const maquette::Tiling one = maquette::tile(choice_.shows_sample ? 3 : 2, area.width, area.height,
+                                              frame().now.width_px, frame().now.height_px);
   const int all_width = one.columns * one.width, all_height = one.rows * one.height;
   image_rect_ = {area.x + (area.width - all_width) / 2, area.y + (area.height - all_height) / 2, all_width, all_height};
   Rect* const rects[] = {&now_rect_, &next_rect_, &sample_rect_};

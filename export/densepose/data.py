@@ -38,8 +38,8 @@ class Cropping:
     sides (log-uniform).
 
     filled: min fraction of the crop's side that the image's long side fills, so that the crop shows more than margin.
-    rolls: (fraction, smallest and largest angle in degrees, either way) by which images are turned that nobody tilted
-    when they were made: photographs.
+    rolls: (fraction, smallest, largest angle in degrees). This fraction of the photographs, which nobody tilted, is
+    turned by such an angle to either side.
     """
 
     towards_person: float = 0.8

@@ -90,9 +90,9 @@ class Prior:
     """K shape codes, M anchors. Lengths in dm; arrays are float32."""
 
     shape: FieldShape
-    constant: list[Layer]  # of each layer: W0, or what all heads have
-    shape_bases: list[Layer]  # of each personal geometry layer: what a unit of a code adds, [K, outputs, inputs]
-    colour_bases: list[Layer]  # of each personal surface layer, [colour codes, outputs, inputs]
+    constant: list[Layer]  # for each layer: the weights W0 that all heads share
+    shape_bases: list[Layer]  # for each personal geometry layer: change by one unit of a code, [K, outputs, inputs]
+    colour_bases: list[Layer]  # for each personal surface layer: [colour codes, outputs, inputs]
     sharpness: float  # s of the opacity along rays, 1/dm
     cut_point: np.ndarray  # [3], of the plane where a head ends, below the chin
     cut_normal: np.ndarray  # [3], of length 1, out of the head

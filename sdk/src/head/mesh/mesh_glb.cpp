@@ -46,7 +46,7 @@ class GlbWriter {
     return accessor_count_++;
   }
 
-  // Adds vectors that are 0 except for those of some vertices (glTF 2.0, 3.6.2.3).
+  // Adds an accessor of vectors that are 0 except at `vertices` (glTF 2.0, 3.6.2.3).
   size_t add_sparse(size_t count, const std::vector<uint32_t>& vertices, const std::vector<float>& vectors,
                     const std::string& more) {
     std::string text = concatenate("{\"componentType\":5126,\"count\":", count, ",\"type\":\"VEC3\"", more);

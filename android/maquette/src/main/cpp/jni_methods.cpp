@@ -154,8 +154,10 @@ void* address_in(JNIEnv* env, jobject memory) { return object<void>(env->GetLong
 extern "C" JNIEXPORT jint JNICALL JNI_OnLoad(JavaVM* machine, void*) {
   JNIEnv* env = nullptr;
   if (machine->GetEnv(reinterpret_cast<void**>(&env), JNI_VERSION_1_6) != JNI_OK) return JNI_ERR;
-  maq_jni::find_callbacks(env, machine);
-  return !env->ExceptionCheck() && maq_jni::register_methods(env) ? JNI_VERSION_1_6 : JNI_ERR;
+  return maq_jni::call(env, [&]() -> jint {
+    maq_jni::find_callbacks(env, machine);
+    return !env->ExceptionCheck() && maq_jni::register_methods(env) ? JNI_VERSION_1_6 : JNI_ERR;
+  });
 }
 
 // The memory of a direct buffer.
@@ -172,10 +174,10 @@ MAQ_NATIVE(Addresses, jobject, bytesAt)(JNIEnv* env, jclass, jlong address, jlon
   return env->NewDirectByteBuffer(maq_jni::object<void>(address), size_bytes);
 }
 
-// The UTF-8 text at an address, as bytes: JNI's own strings are not quite UTF-8.
+// The UTF-8 text at an address, as bytes: JNI's own strings are not quite UTF-8. NULL is an empty text.
 MAQ_NATIVE(Addresses, jbyteArray, textAt)(JNIEnv* env, jclass, jlong address) {
   const auto* const text = maq_jni::object<const jbyte>(address);
-  const auto size = jsize(std::strlen(reinterpret_cast<const char*>(text)));
+  const auto size = text == nullptr ? 0 : jsize(std::strlen(reinterpret_cast<const char*>(text)));
   jbyteArray bytes = env->NewByteArray(size);
   if (bytes != nullptr) env->SetByteArrayRegion(bytes, 0, size, text);
   return bytes;

@@ -105,9 +105,9 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror
 	@! LC_ALL=C.UTF-8 git grep -nE '^.{121}' -- '*.h' '*.hpp' '*.c' '*.cpp' || { echo "Lines have at most 120 characters." >&2; exit 1; }
 	@scripts/make-venv.sh dev & venv=$$!; trap wait EXIT; \
-	    cmake --preset debug -DMAQ_BUILD_TESTS=ON >/dev/null; \
+	    cmake --preset debug -B build/lint -DMAQ_BUILD_TESTS=ON -DMAQ_UNITY_FILES=16 >/dev/null; \
 	    git ls-files -co --exclude-standard 'sdk/src/*.cpp' 'sdk/app/*.cpp' 'sdk/tools/*.cpp' 'desktop_demo/src/*.cpp' \
-	        | xargs -r $(PYTHON) scripts/clang_tidy.py --build build/debug; \
+	        | xargs -r $(PYTHON) scripts/clang_tidy.py --build build/lint; \
 	    wait $$venv
 	@.venv/bin/ruff format --check . && .venv/bin/ruff check .
 

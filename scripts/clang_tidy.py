@@ -1,6 +1,6 @@
 """Runs clang-tidy on the C++ sources of a build, on every processor, and only where something changed.
 
-    python scripts/clang_tidy.py [--build build/debug] FILE...        (in the project's root)
+    python scripts/clang_tidy.py [--build build/lint] FILE...        (in the project's root)
 
 A file is checked together with those that the build compiles with it, and again when one of them, a header that they
 include, their compile command, .clang-tidy or clang-tidy itself changed: the stamps under ~/.cache/maquette/clang-tidy
@@ -123,7 +123,7 @@ class Checker:
 
 def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--build", type=Path, default=Path("build/debug"))
+    parser.add_argument("--build", type=Path, default=Path("build/lint"))
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     options = parser.parse_args(arguments)
     known = compilations(options.build)

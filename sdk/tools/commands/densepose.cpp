@@ -22,8 +22,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double kDegree_rad = 3.14159265358979323846 / 180;
-
 struct DensePoseOptions {
   std::vector<std::string> sources;
   ModelOptions model;
@@ -143,7 +141,8 @@ int run_densepose(const DensePoseOptions& options) {
   Timings timings;
   const auto load = [&] {
     densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
-    densepose->set_roll(float(options.roll_deg * kDegree_rad));
+    constexpr double degree_rad = 3.14159265358979323846 / 180;
+    densepose->set_roll(float(options.roll_deg * degree_rad));
   };
   const auto run = [&](const SourceArgument& argument, maquette::Source& source) {
     run_source(options, argument, context, source, *densepose, timings);

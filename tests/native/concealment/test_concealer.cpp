@@ -115,7 +115,7 @@ TEST_F(Concealer, DroppedAndJitteringFramesKeepOrderAndMarks) {
   for (const char* faults : {"drop=0.2", "jitter=20ms", "drop=0.1&jitter=10ms&corrupt=0.05"}) {
     maquette::Source source = open(std::string("stub:people?fps=60&size=64x48&fault_seed=3&") + faults);
     maquette::Concealer concealer(context_, source, config());
-    const std::vector<Seen> all = take(concealer, 90);
+    const std::vector<Seen> all = take(concealer, 60);
     const int predicted = check(all, 300);
     EXPECT_GT(predicted, 0) << faults;
   }

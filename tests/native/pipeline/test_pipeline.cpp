@@ -439,7 +439,7 @@ TEST(Pipeline, APhotoIsMappedAgainWithOtherOptions) {
 
 TEST(Pipeline, APhotoIsMappedAgainAlsoBeforeItsEndIsTold) {
   Watched watched(polling(false));
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 8; ++i) {
     watched.pipeline->set_source("image:" MAQ_TEST_MEDIA "/photo.jpg?size=64x48");
     ASSERT_TRUE(watched.pipeline->next().has_value()) << i;
     maq_densepose_config config = densepose_config();
@@ -507,12 +507,12 @@ TEST(Pipeline, StopsFromACallback) {
 }
 
 TEST(Pipeline, CanBeDestroyedAtAnyTime) {
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < 8; ++i) {
     Watched::Options options = polling(i % 2 == 0);
     options.polls = i % 3 == 0;
     Watched watched(options);
     watched.pipeline->set_source("stub:people?size=64x48");
-    const uint64_t enough = i < 4 ? 0 : uint64_t(i);
+    const uint64_t enough = i < 4 ? 0 : uint64_t(i - 3);
     ASSERT_TRUE(watched.until([&] { return watched.pipeline->stats().result_count >= enough; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(i % 4 * 5));
   }

@@ -312,7 +312,7 @@ TEST(MotionPredictor, PredictorsThatTakeTurnsInOneMemoryPredictAsThoseAlone) {
                       {24, 700, maq::MotionPredictor({maq::PredictionMethod::kAuto, 1, shared}),
                        maq::MotionPredictor({maq::PredictionMethod::kAuto, 1})}};
   maq::Frame turn, alone;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < 8; ++i) {
     for (Stream& stream : streams) {
       const maq::Frame frame =
           moving_texture::frame(MAQ_PIXEL_NV12, stream.width, stream.height, 1.5 * i, -0.5 * i, i * kFrame_ns);
@@ -492,7 +492,7 @@ TEST(MotionPredictor, TheSameBitsForAnyNumberOfThreads) {
   for (const int threads : {1, 2, 3}) {
     maq::MotionPredictor predictor({maq::PredictionMethod::kAuto, threads});
     maq::Frame predicted;
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 5; ++i) {
       predictor.push(moving_texture::frame(MAQ_PIXEL_BGR8, 640, 480, 3.3 * i, -1.7 * i, i * kFrame_ns));
     }
     predictor.predict(3 * kFrame_ns, predicted);

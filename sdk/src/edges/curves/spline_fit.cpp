@@ -64,6 +64,7 @@ bool SplineFitter::solve(const FitPoint* points, size_t count, int control_count
   double a[kStride * kStride] = {}, b[kStride * 3] = {};
   const int unknowns =
       is_closed ? control_count - 1 : control_count;  // the last control of a closed curve is its first
+  if (unknowns < 1) return false;
   const auto add = [&](const int* index, const double* value, int terms, double w, Vec3 target) {
     for (int i = 0; i < terms; ++i) {
       const int row = index[i] % unknowns;

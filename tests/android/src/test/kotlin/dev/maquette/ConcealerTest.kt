@@ -149,7 +149,7 @@ class ConcealerTest : AndroidTest() {
             val frame = concealer.acquireFrame()
             assertNotNull("after $frames frames", frame)
             frame!!.close()
-            ++frames > 150
+            ++frames > 40
         }
         concealer.close()
     }

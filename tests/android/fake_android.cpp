@@ -163,7 +163,7 @@ OF_FAKE(jobject, memoryOf)(JNIEnv* env, jclass, jobject buffer) {
   return env->NewDirectByteBuffer(found->memory.data(), jlong(found->memory.size()));
 }
 
-// What a surface shows: width, height, how many pictures it got, then the pixels as 0xAABBGGRR.
+// Returns the content of a surface: width, height, how many pictures it got, then the pixels as 0xAABBGGRR.
 OF_FAKE(jintArray, shownOn)(JNIEnv* env, jclass, jobject surface) {
   const jint key = identity(env, surface);
   FakeNdkGraphics::Picture picture{};

@@ -1,19 +1,15 @@
-"""Counts sentences that break the language rules, by file. Prints each of them, or lowers the numbers of the list of
-exceptions, which may only shrink:
+"""Prints each sentence that breaks the language rules. Exit status 1 if there is one.
 
 python tests/python/support/plain_english.py [FILE...]
-python tests/python/support/plain_english.py --lower
 """
 
 import argparse
 import re
 import subprocess
 import sys
-from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-EXCEPTIONS = Path("tests/python/project/language_exceptions.txt")
 # (files, maximum number of words in a sentence); the first match counts.
 MAX_WORDS = [
     (r"sdk/include/maquette/.*\.h(pp)?", 25),
@@ -122,48 +118,17 @@ def checked_files() -> list[str]:
     return [name for name in listed if TEXT.fullmatch(name) and not SKIPPED.fullmatch(name) and Path(name).is_file()]
 
 
-def counted() -> dict[str, Counter]:
-    """How many faults of each kind each file has; files without any are left out."""
-    found = {name: Counter(kind for _, kind, _ in faults(name, Path(name).read_text())) for name in checked_files()}
-    return defaultdict(Counter, {name: kinds for name, kinds in found.items() if kinds})
-
-
-def listed() -> dict[str, Counter]:
-    """The list of exceptions: lines such as `path: long 3, opening 1`."""
-    entries = defaultdict(Counter)
-    for line in EXCEPTIONS.read_text().splitlines():
-        if line and not line.startswith("#"):
-            name, _, kinds = line.rpartition(": ")
-            entries[name] = Counter({kind: int(count) for kind, count in (part.split() for part in kinds.split(", "))})
-    return entries
-
-
-def lower() -> None:
-    found = counted()
-    allowed = listed() if EXCEPTIONS.exists() else found  # the first list
-    kept = {name: kinds & allowed[name] for name, kinds in sorted(found.items()) if name in allowed}
-    lines = [
-        f"{name}: {', '.join(f'{kind} {n}' for kind, n in sorted(kinds.items()))}"
-        for name, kinds in kept.items()
-        if kinds
-    ]
-    head = f"# Sentences that break the language rules, by file. Lower it: python {sys.argv[0]} --lower\n"
-    EXCEPTIONS.write_text(head + "".join(f"{line}\n" for line in lines))
-    print(f"{EXCEPTIONS}: {len(lines)} files, {sum(sum(kinds.values()) for kinds in kept.values())} sentences")
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="*", help="default: all files of the repository")
-    parser.add_argument("--lower", action="store_true", help="lower the numbers of the list to those of today")
-    options = parser.parse_args()
-    if options.lower:
-        lower()
-        return 0
-    for name in options.files or checked_files():
-        for line, kind, text in faults(name, Path(name).read_text()):
-            print(f"{name}:{line}: {kind}: {' '.join(text.split())[:200]}")
-    return 0
+    names = parser.parse_args().files or checked_files()
+    found = [
+        f"{name}:{line}: {kind}: {' '.join(text.split())[:200]}"
+        for name in names
+        for line, kind, text in faults(name, Path(name).read_text())
+    ]
+    print("\n".join(found))
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-// What native code throws, which jni_call.h makes a Java exception.
+// The exception of native code. jni_call.h turns it into a Java exception.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// What is used of <android/hardware_buffer.h> and <android/native_window.h>: the NDK's headers, or, where there is
-// none, the same declarations; and the functions, found at run time, so that a test takes Android's place.
+// Declarations of <android/hardware_buffer.h> and <android/native_window.h>: from the NDK, or copies of the needed ones
+// without an NDK. The functions are looked up at run time, so that a test can take Android's place.
 #pragma once
 
 #include <cstdint>
@@ -70,7 +70,7 @@ struct GraphicsFunctions {
   Type_##name* name = nullptr;
   MAQ_FUNCTIONS_OF_NATIVEWINDOW(MAQ_FUNCTION)
 #undef MAQ_FUNCTION
-  // Of Android 10 (API level 29); null before.
+  // Exists since Android 10 (API level 29); null before.
   int (*AHardwareBuffer_lockPlanes)(AHardwareBuffer*, uint64_t, int32_t fence, const ARect*,
                                     AHardwareBuffer_Planes*) = nullptr;
 };

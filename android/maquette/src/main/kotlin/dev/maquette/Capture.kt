@@ -24,7 +24,7 @@ class Capture internal constructor(context: Long, folder: String) : AutoCloseabl
     /** The photos. */
     val views: List<View>
 
-    /** Of the cloud. */
+    /** Number of points of the point cloud. */
     val pointCount: Long
 
     /** Up in the world: x, y, z of length 1. */

@@ -9,7 +9,7 @@ import java.nio.ByteBuffer
 class DensePose internal constructor(pointer: Long) : AutoCloseable {
     private val handle = Handle(this, pointer, Native::maq_densepose_destroy)
 
-    /** What is computed for each pixel of a person. */
+    /** The values that are computed for each pixel of a person. */
     enum class Detail(internal val code: Int) {
         /** Part, U and V. */
         SURFACE(MAQ_DENSEPOSE_DETAIL_SURFACE),
@@ -18,12 +18,12 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         PART(MAQ_DENSEPOSE_DETAIL_PART),
     }
 
-    /** What runs the layers of networks. */
+    /** The library or hardware that runs the layers of networks. */
     enum class Provider(internal val code: Int) {
         /** ONNX Runtime's own kernels. */
         CPU(MAQ_PROVIDER_CPU),
 
-        /** Those of XNNPACK, for networks of floats, on the CPU. */
+        /** Kernels of XNNPACK, for networks of floats, on the CPU. */
         XNNPACK(MAQ_PROVIDER_XNNPACK),
 
         /** Accelerators of the device; may be slower than the CPU: measure it. */
@@ -35,11 +35,11 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         }
     }
 
-    /** Whose surface is computed again from a crop of the frame in its full resolution, rotated upright. */
+    /** Chooses the people whose surface is computed again from an upright crop of the frame in full resolution. */
     enum class PersonCrops(internal val code: Int) {
         OFF(MAQ_DENSEPOSE_CROPS_OFF),
 
-        /** Of people who are small in the networks' input, or lean. */
+        /** Crops of people who are small in the networks' input, or lean. */
         AUTO(MAQ_DENSEPOSE_CROPS_AUTO),
         ALL(MAQ_DENSEPOSE_CROPS_ALL),
     }
@@ -144,7 +144,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
     AutoCloseable {
     internal val handle = Handle(this, pointer, release)
 
-    /** What is known of each pixel. */
+    /** The values of each pixel, one plane for each. */
     enum class Plane(internal val code: Int) {
         /** Body part 1 to 24, 0 for background. */
         PART(MAQ_DENSEPOSE_PLANE_PART),
@@ -279,7 +279,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
      */
     fun save(path: String) = handle.use { Native.maq_densepose_result_save(it, textOf(path)) }
 
-    /** Of the run that gave the result. */
+    /** Times and counts of the run that gave the result. */
     val stats: Stats
         get() {
             val s = handle.read(maq_densepose_stats(), Native::maq_densepose_result_get_stats)

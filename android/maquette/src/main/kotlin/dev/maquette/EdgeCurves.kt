@@ -83,7 +83,7 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
         val centre: Point3,
     )
 
-    /** What a pointer can snap to. */
+    /** The kinds of targets that a pointer can snap to. */
     enum class Target(internal val code: Int) {
         NOTHING(MAQ_EDGES_SNAP_NOTHING),
         CORNER(MAQ_EDGES_SNAP_CORNER),

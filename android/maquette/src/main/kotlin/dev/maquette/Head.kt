@@ -49,8 +49,8 @@ class Head internal constructor(pointer: Long) : AutoCloseable {
     val landmarks: Map<String, Landmark>
 
     /**
-     * Of the photos that it was fitted to ([HeadBuilder.Photo.isUsed]), in the order they were added: what
-     * [HeadRenderer.run] draws with one of them lies on the head in the photo.
+     * Cameras of the photos that the head was fitted to ([HeadBuilder.Photo.isUsed]), in the order they were added.
+     * [HeadRenderer.run] with one of them draws the head where the photo shows it.
      */
     val cameras: List<PinholeCamera>
 

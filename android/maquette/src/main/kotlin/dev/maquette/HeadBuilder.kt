@@ -70,7 +70,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * What was found in a photo. The last three describe the latest [fit], and are false or 0 before.
+     * The head that was found in a photo. The last three describe the latest [fit], and are false or 0 before.
      *
      * @property box of the head: given, or detected.
      * @property headCoverage fraction of the encoder's crop that shows the head, 0 to 1.
@@ -106,7 +106,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         val threads: Int,
     )
 
-    /** What was found in each photo, in the order of [addPhoto]. */
+    /** The head of each photo, in the order of [addPhoto]. */
     val photos: List<Photo>
         get() =
             List(nativeStats().photo_count) { index ->

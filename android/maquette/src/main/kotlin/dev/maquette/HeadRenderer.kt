@@ -17,7 +17,7 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
             Native::maq_head_renderer_destroy,
         )
 
-    /** What the colours of an image show. */
+    /** Chooses what the colours of an image show. */
     enum class Shading(internal val code: Int) {
         /** The mesh's texture, or its colours if it has none; in soft light. */
         COLOUR(MAQ_HEAD_SHADING_COLOUR),

@@ -41,7 +41,7 @@ class LiveView @JvmOverloads constructor(
     /** Left and right change sides, as in a mirror: what people expect of a camera in the front. */
     @Volatile var isMirrored = false
 
-    /** Of the people's colours, 0 (the frame alone) to 255 (they cover it). */
+    /** Opacity of the people's colours, 0 (the frame alone) to 255 (they cover it). */
     @Volatile var opacity = 180
         set(value) {
             require(value in 0..255) { "The opacity is $value; it must be 0 to 255." }

@@ -36,7 +36,7 @@ class Recorder internal constructor(
         handle = Handle(this, made, Native::maq_recorder_destroy)
     }
 
-    /** What has been written so far. */
+    /** Frames and bytes that have been written so far. */
     data class Info(val frameCount: Long, val sizeBytes: Long)
 
     /** As it is now. */

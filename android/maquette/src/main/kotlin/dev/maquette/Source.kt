@@ -68,10 +68,10 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
     }
 
     /**
-     * What it delivers.
+     * Size, rate and number of the frames of a source.
      *
      * @property fps frames a second; 0 for a single image.
-     * @property frameCount of the whole; -1 if unknown or endless.
+     * @property frameCount number of frames of the whole source; -1 if unknown or endless.
      * @property isLive true for a camera: frames that are not acquired in time are lost.
      * @property clock of the timestamps of its frames.
      * @property droppedFrames lost so far, by the camera or because they were not acquired in time.
@@ -87,7 +87,7 @@ class Source internal constructor(context: Long, uri: String, config: Config) : 
         val droppedFrames: Long,
     )
 
-    /** What happens to a camera. */
+    /** Events of a camera. */
     enum class State(internal val code: Int) {
         STARTED(MAQ_SOURCE_STARTED),
 

@@ -27,7 +27,7 @@ abstract class AndroidTest {
         assertThrows(IllegalStateException::class.java) { work() }
     }
 
-    /** What the process has in memory. */
+    /** Returns the memory of this process. */
     protected fun residentMiB(): Long {
         val line = File("/proc/self/status").readLines().first { it.startsWith("VmRSS") }
         return line.filter(Char::isDigit).toLong() / 1024

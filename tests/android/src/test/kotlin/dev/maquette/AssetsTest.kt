@@ -33,7 +33,7 @@ class AssetsTest : AndroidTest() {
                 zip.write(bytes)
             }
         }
-        // What Android does for an app; apps cannot.
+        // Android does this for an app; apps cannot.
         val assets = AssetManager::class.java.getConstructor().newInstance()
         val cookie = AssetManager::class.java.getMethod("addAssetPath", String::class.java).invoke(assets, apk.path)
         assertNotEquals(0, cookie)

@@ -5,7 +5,7 @@ import android.view.Surface
 import java.io.File
 import java.nio.ByteBuffer
 
-/** What lies behind hardware buffers, surfaces and bitmaps in these tests (fake_android.cpp). */
+/** The native side of hardware buffers, surfaces and bitmaps in these tests (fake_android.cpp). */
 object FakeAndroid {
     init {
         val root = File(System.getProperty("maquette.root")!!)
@@ -17,7 +17,7 @@ object FakeAndroid {
 
     @JvmStatic private external fun shownOn(surface: Surface): IntArray
 
-    /** What comes after [Surface]'s end: using it from now on is a mistake. */
+    /** Ends a [Surface]: using it from now on is a mistake. */
     @JvmStatic external fun takeAway(surface: Surface)
 
     /** Mistakes that would end an app, and what is kept or locked still. */

@@ -7,7 +7,7 @@ import android.view.SurfaceHolder
 import java.lang.reflect.Proxy
 import org.robolectric.Shadows.shadowOf
 
-/** What Android does with the surface of a view; Robolectric has none. */
+/** Creates and ends the surface of a view, as Android does; Robolectric has none. */
 class FakeSurface(private val view: LiveView) {
     private val surface = Surface(SurfaceTexture(1))
     private val holder =
@@ -40,5 +40,5 @@ class FakeSurface(private val view: LiveView) {
     }
 }
 
-/** Those that draw. */
+/** Returns the threads that draw. */
 fun threadsOfView(): List<Thread> = Thread.getAllStackTraces().keys.filter { it.name == "maquette-view" && it.isAlive }

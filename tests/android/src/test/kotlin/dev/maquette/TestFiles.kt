@@ -4,7 +4,7 @@ import java.io.File
 import java.nio.ByteBuffer
 import java.nio.file.Files
 
-/** What the repository has to test with. */
+/** Files of the repository for tests. */
 object TestFiles {
     private val root = File(System.getProperty("maquette.root")!!)
     val bundle = File(root, "sdk/models/densepose-b-int8")

@@ -46,7 +46,7 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
         }
     }
 
-    /** Of a stage ("frame": of all of it), interpolated. */
+    /** Returns a percentile of the times of a stage, interpolated. The stage "frame" is the whole frame. */
     fun percentile(stage: String, percent: Int): Double {
         val sorted = times[STAGES.indexOf(stage)].sorted()
         val at = percent / 100.0 * (sorted.size - 1)
@@ -104,7 +104,7 @@ class TimedSource(private val maquette: Maquette, val uri: String) : AutoCloseab
     }
 }
 
-/** What `maquette bench` measures, on this device: the same sources, and the same report. */
+/** Measures on this device what `maquette bench` measures: the same sources, and the same report. */
 class Benchmark(private val maquette: Maquette, private val bundle: ModelBundle) {
     /**
      * Takes some seconds.

@@ -27,7 +27,7 @@ abstract class CaptureActivity : Screen() {
     /** Called on the thread that will use the camera. Throws, with a sentence, where there is none. */
     protected abstract fun openCamera(): PosedCamera
 
-    /** What the user must know before; may be empty. */
+    /** A text that the user must read before the capture; may be empty. */
     protected open val notice: String get() = ""
 
     override fun onCreate(state: Bundle?) {
@@ -59,7 +59,7 @@ abstract class CaptureActivity : Screen() {
         super.close()
     }
 
-    /** Of the scene that is built. */
+    /** Long side of the images that the scene is built from. */
     protected open val longSidePx get() = 640
 
     private fun mayUseCamera() = checkSelfPermission(CAMERA) == PERMISSION_GRANTED

@@ -23,7 +23,7 @@ open class HeadActivity : PictureScreen() {
 
     private class View(val mesh: HeadMesh, val renderer: HeadRenderer)
 
-    // Of the worker; with the networks, which are loaded when there is a photo.
+    // The worker alone uses these. The networks are loaded when there is a photo.
     private val densePose = lazy { maquette.densePose(networks("densepose-b-int8")) }
     private val builder = lazy {
         maquette.headBuilder(networks("heads-int8"), HeadBuilder.Config(texture = HeadBuilder.Texture.ON, texturePx = TEXTURE_PX))

@@ -74,7 +74,7 @@ open class LiveActivity : PeopleScreen() {
     }
 
     private companion object {
-        /** Of a camera of 30 pictures a second: on a device that throttles the networks do less. */
+        /** Time between two frames of a camera of 30 a second. On a device that throttles, the networks do less. */
         const val FRAME_MS = 33.0
     }
 }

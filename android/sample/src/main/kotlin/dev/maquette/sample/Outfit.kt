@@ -6,8 +6,8 @@ import dev.maquette.DensePoseResult
 import kotlin.math.floor
 
 /**
- * What is worn: a colour for each point of the body. As in the desktop demo, a picture of 2 : 3 is an atlas of 4 x 6
- * charts in the DensePose layout; any other is repeated over the body's front and back.
+ * An outfit: a colour for each point of the body. As in the desktop demo, an image of 2 : 3 is an atlas of 4 x 6
+ * charts in the DensePose layout; any other image is repeated over the body's front and back.
  *
  * @param surface of the networks that find the people; an atlas needs none.
  * @throws IllegalArgumentException for another picture without a surface.

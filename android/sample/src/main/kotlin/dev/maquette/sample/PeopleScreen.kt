@@ -10,11 +10,11 @@ import dev.maquette.DensePoseResult
 
 /** A screen of people, painted by body part or dressed. */
 abstract class PeopleScreen : PictureScreen() {
-    /** What people wear; null: they are painted by body part. */
+    /** The image that people wear; null: they are painted by body part. */
     @Volatile
     private var worn: Bitmap? = null
 
-    /** Of the thread that paints; with the picture that it was made of. */
+    /** The outfit with the image that it was made of. The painting thread alone uses it. */
     private var outfit: Pair<Bitmap, Outfit>? = null
     private lateinit var mode: Button
 
@@ -26,7 +26,7 @@ abstract class PeopleScreen : PictureScreen() {
         button("Wear a picture") { pickImage(OUTFIT) }
     }
 
-    /** What is worn has changed. */
+    /** Is called after the outfit has changed. */
     protected open fun onModeChanged() = Unit
 
     protected open fun defaultOutfit(): Bitmap = assets.open("outfit.png").use(BitmapFactory::decodeStream)

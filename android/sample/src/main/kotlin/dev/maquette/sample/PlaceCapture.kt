@@ -22,7 +22,7 @@ import kotlin.math.sqrt
  * @param maxPhotos each is kept in memory: 0.5 MB at 640 x 480.
  */
 class PlaceCapture(private val maxPhotos: Int = 60) : AutoCloseable {
-    /** What became of an image. */
+    /** The decision about an image. */
     enum class Verdict {
         KEPT,
 

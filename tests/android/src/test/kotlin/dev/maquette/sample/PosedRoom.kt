@@ -48,7 +48,7 @@ class PosedRoom(
         return TrackedImage(capture.loadView(photo), view.camera.intrinsics, floats(pose), floats(points))
     }
 
-    /** Of a held-out photo and of what `scene` shows from there, in levels. */
+    /** Returns the mean difference between a held-out photo and the rendering from its camera, in grey levels. */
     fun differenceFromHeldOut(scene: Scene, networks: ModelBundle): Double {
         val index = capture.views.indices.first { capture.views[it].isHeldOut }
         val view = capture.views[index].camera

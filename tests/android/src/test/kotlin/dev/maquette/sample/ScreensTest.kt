@@ -17,7 +17,7 @@ import org.robolectric.Robolectric
 import org.robolectric.RuntimeEnvironment
 import org.w3c.dom.Element
 
-/** What holds for every screen: with a screen reader, with thumbs, with large letters, at night. */
+/** Checks that hold for every screen: with a screen reader, with thumbs, with large letters, at night. */
 class ScreensTest : AndroidTest() {
     private val screens =
         listOf(

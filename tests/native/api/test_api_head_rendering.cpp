@@ -221,10 +221,12 @@ TEST_F(ApiHeadRendering, WrongCamerasAreASentence) {
   for (const int wrong : {0, 6}) {
     EXPECT_EQ(maq_image_get_plane(image.get(), maq_image_plane(wrong), &plane, &stride), MAQ_ERROR_INVALID_ARGUMENT);
   }
+#if MAQ_HAS_SCENES
   maq_scene_render_stats stats{};
   stats.struct_size = sizeof stats;
   EXPECT_EQ(maq_image_get_scene_stats(image.get(), &stats), MAQ_ERROR_INVALID_ARGUMENT);
   expect_text("image is of a head");
+#endif
   maq_pinhole_camera camera{};
   camera.struct_size = sizeof camera;
   EXPECT_EQ(maq_head_renderer_get_camera(renderer.get(), nan, 0, 64, 48, &camera), MAQ_ERROR_INVALID_ARGUMENT);

@@ -90,7 +90,7 @@ class Tally:
         gap = np.abs(expected.iuv[same][:, 1:].astype(np.int64) - actual.iuv[same][:, 1:])
         self._difference += gap.sum(0) / 255
 
-    def figures(self) -> Agreement:
+    def metrics(self) -> Agreement:
         du, dv = (fraction(value, self._same) for value in self._difference)
         return Agreement(
             images=self._images,
@@ -122,7 +122,7 @@ def compare(expected: Iterable[Prediction], actual: Iterable[Prediction]) -> Agr
     tally = Tally()
     for first, second in zip(expected, actual, strict=True):
         tally.add(first, second)
-    return tally.figures()
+    return tally.metrics()
 
 
 def agreement(float_bundle: Path, int8_bundle: Path, images: list[np.ndarray], kind: str = "capi") -> Agreement:
@@ -163,15 +163,15 @@ def load_images(source: Path, limit: int | None = None) -> list[np.ndarray]:
     return [image for _, image in pictures(source, limit or 10**9, limit or 24)]
 
 
-def print_figures(figures: Agreement, title: str, console: Console | None = None) -> None:
+def print_metrics(metrics: Agreement, title: str, console: Console | None = None) -> None:
     table = Table(title=title, title_justify="left", show_header=False)
     for name, value in (
-        ("label agreement", f"{100 * figures.labels:.2f} %"),
-        ("where both paint", f"{100 * figures.parts:.2f} %"),
-        ("mask IoU", f"{100 * figures.mask_iou:.2f} %"),
-        ("people, fp32 / int8", f"{figures.people[0]} / {figures.people[1]}"),
-        ("images with as many people", f"{100 * figures.same_count:.1f} % of {figures.images}"),
-        ("mean |dU|, |dV|", f"{figures.du:.4f}, {figures.dv:.4f}"),
+        ("label agreement", f"{100 * metrics.labels:.2f} %"),
+        ("where both paint", f"{100 * metrics.parts:.2f} %"),
+        ("mask IoU", f"{100 * metrics.mask_iou:.2f} %"),
+        ("people, fp32 / int8", f"{metrics.people[0]} / {metrics.people[1]}"),
+        ("images with as many people", f"{100 * metrics.same_count:.1f} % of {metrics.images}"),
+        ("mean |dU|, |dV|", f"{metrics.du:.4f}, {metrics.dv:.4f}"),
     ):
         table.add_row(name, value)
     (console or Console()).print(table)
@@ -197,19 +197,19 @@ def main(argv: list[str] | None = None) -> int:
         images = load_images(arguments.images, arguments.limit)
         with tempfile.TemporaryDirectory() as folder:
             int8 = mixed(arguments.reference, arguments.int8, arguments.in_float, Path(folder) / arguments.int8.name)
-            figures = agreement(arguments.reference, int8, images, arguments.backend)
+            metrics = agreement(arguments.reference, int8, images, arguments.backend)
     except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Nothing was compared: {error}", file=sys.stderr)
         return 1
     name = " with float ".join([str(arguments.int8), *filter(None, [", ".join(arguments.in_float)])])
-    print_figures(figures, f"{name} against {arguments.reference}, {arguments.images}")
+    print_metrics(metrics, f"{name} against {arguments.reference}, {arguments.images}")
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         document = {"schema": "maquette-agreement-1", "gate": GATE, "stretch": STRETCH, "images": str(arguments.images)}
-        arguments.json.write_text(json.dumps(document | {"figures": plain(asdict(figures))}, indent=1) + "\n")
-    verdict = "reaches" if figures.passed else "misses"
-    print(f"Label agreement {100 * figures.labels:.2f} % {verdict} the gate of {100 * GATE:.0f} %.")
-    return 0 if figures.passed else 1
+        arguments.json.write_text(json.dumps(document | {"metrics": plain(asdict(metrics))}, indent=1) + "\n")
+    verdict = "reaches" if metrics.passed else "misses"
+    print(f"Label agreement {100 * metrics.labels:.2f} % {verdict} the gate of {100 * GATE:.0f} %.")
+    return 0 if metrics.passed else 1
 
 
 if __name__ == "__main__":

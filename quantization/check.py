@@ -74,7 +74,7 @@ def own_errors(
     return found
 
 
-def figures_of(errors: list[TensorError]) -> dict[str, list[float | None]]:
+def metrics_of(errors: list[TensorError]) -> dict[str, list[float | None]]:
     """`here` and `worst_channel` in dB by "graph: tensor", for a JSON file."""
     return {f"{e.graph}: {e.name}": [_finite(e.here), _finite(e.worst_channel)] for e in errors}
 
@@ -86,7 +86,7 @@ def _finite(value: float | None) -> float | None:
 
 def complaints(expected: dict[str, list[float | None]], errors: list[TensorError]) -> list[str]:
     """One sentence for every tensor that is not as expected; worst first, empty if all is well."""
-    actual = figures_of(errors)
+    actual = metrics_of(errors)
     found = [(math.inf, f"{name} is no longer quantized, or is gone") for name in expected.keys() - actual.keys()]
     found += [(math.inf, f"{name} is quantized, but unknown") for name in actual.keys() - expected.keys()]
     for name in expected.keys() & actual.keys():

@@ -163,11 +163,11 @@ def run(arguments: argparse.Namespace) -> int:
         def measure(taken: list[Candidate]) -> float:
             target = made(taken)
             found = agreement.open_bundle(target, arguments.backend)
-            figures = agreement.compare(expected, agreement.predictions(found, images))
+            metrics = agreement.compare(expected, agreement.predictions(found, images))
             last = f"{taken[-1].graph}: {taken[-1].pattern}" if taken else "as the settings are"
             megabytes = bytes_of(target) / 1e6
-            console.print(f"{100 * figures.labels:6.2f} %  {megabytes:.2f} MB  {last}", highlight=False)
-            return figures.labels
+            console.print(f"{100 * metrics.labels:6.2f} %  {megabytes:.2f} MB  {last}", highlight=False)
+            return metrics.labels
 
         size = bytes_of(made([]))
         taken, measured = pick(ranked, size, int(1e6 * arguments.budget), measure, arguments.gate)

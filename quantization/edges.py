@@ -20,7 +20,7 @@ from export.densepose.graphs import session
 from export.edges.bundle import write_manifest
 from export.edges.data import Frame, read_frames
 from export.edges.graph_field import field_of_planes, slopes_of
-from export.edges.metrics import frame_figures
+from export.edges.metrics import frame_metrics
 from export.edges.validation import frame_through
 from export.solids.sensors import LEVELS
 from quantization.quantize import int8_info, quantize_graphs
@@ -49,7 +49,7 @@ def cost(fp32: Path, int8: Path, frames: Sequence[Frame], levels: Sequence[str])
             for name, graph in sessions.items():
                 fields[name] = field_of_planes(graph.run(None, given)[0])
                 counts = frame.counts & (seen > 0)
-                rmse[name].append(frame_figures(fields[name], frame.distance, counts)["rmse_r"])
+                rmse[name].append(frame_metrics(fields[name], frame.distance, counts)["rmse_r"])
             same.append(((fields["fp32"] < 1) == (fields["int8"] < 1))[seen > 0].mean())
         out[level] = {f"rmse_r_{name}": round(float(np.nanmean(values)), 4) for name, values in rmse.items()}
         out[level]["same_side"] = round(float(np.mean(same)), 5)

@@ -32,7 +32,7 @@ from tqdm import tqdm
 from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.heads.bundle import PRIOR, TEMPLATE, write_manifest
-from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, figures
+from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, metrics
 from export.heads.encoder_data import (
     Backgrounds,
     Crop,
@@ -56,7 +56,7 @@ from quantization.samples import Sample
 from quantization.settings import HEADS, GraphSettings, HeadSettings, read_settings
 
 PARTS = {"template_point": POINT, "log_sigma": LOG_SIGMA, "matte": MATTE, "normal": NORMAL}
-# Metrics of `figures` that are shown, in this order, with digits: template points in mm, matte, degrees.
+# Metrics of `metrics` that are shown, in this order, with digits: template points in mm, matte, degrees.
 FIGURES = {"median_mm": 3, "point_mm": 3, "within_2_sigma": 4, "matte_iou": 4, "normal_deg": 2}
 
 
@@ -88,9 +88,9 @@ def cells_of(encoder: Path, given: Sequence[Sample]) -> Tensor:
     return torch.from_numpy(np.concatenate([run.run(["cells"], sample)[0] for sample in given]))
 
 
-def figures_of(cells: Tensor, crops: Sequence[Crop]) -> dict[str, float]:
+def metrics_of(cells: Tensor, crops: Sequence[Crop]) -> dict[str, float]:
     """FIGURES on crops whose truth is known."""
-    found = figures(cells, *batched(list(crops))[1:])
+    found = metrics(cells, *batched(list(crops))[1:])
     return {name: round(found[name], digits) for name, digits in FIGURES.items()}
 
 
@@ -152,7 +152,7 @@ def print_blocks(source: Path, settings: GraphSettings, calibration: list[Sample
     def add(name: str, path: Path) -> None:
         cells = cells_of(path, given)
         cells_text = [f"{path.stat().st_size / 1e3:.0f}", *(f"{v:.1f}" for v in parts_sqnr(expected, cells).values())]
-        table.add_row(name, *cells_text, *(str(value) for value in figures_of(cells, crops).values()))
+        table.add_row(name, *cells_text, *(str(value) for value in metrics_of(cells, crops).values()))
 
     with tempfile.TemporaryDirectory() as folder:
         prepared, target = Path(folder) / "prepared.onnx", Path(folder) / "tried.onnx"
@@ -208,7 +208,7 @@ def run(options: argparse.Namespace) -> None:
     cells = {"fp32": cells_of(source, given), "int8": cells_of(options.out / ENCODER, given)}
     quality["encoder"] |= parts_sqnr(*cells.values())
     print("  dB: " + ", ".join(f"{name} {quality['encoder'][name]:.1f}" for name in PARTS))
-    encoder_cost = {name: figures_of(found, crops) for name, found in cells.items()}
+    encoder_cost = {name: metrics_of(found, crops) for name, found in cells.items()}
     print_cost(encoder_cost, f"encoder, {len(crops)} crops")
     if kept:
         of_bases = kept["measured"]["bases_cost"]

@@ -73,8 +73,8 @@ def cost(fp32: Path, int8: Path, frames: np.ndarray, codes: FrameCodes) -> dict[
             made.append(decoder.run(None, {"features": entries_of(seen[-1], codes)})[0])
         numbers[name], rebuilt[name] = np.stack(seen), torch.from_numpy(np.concatenate(made))
     truth = torch.from_numpy(frames)
-    figures = {f"psnr_db_{name}": round(float(psnr_db(own, truth).mean()), 2) for name, own in rebuilt.items()}
-    return {"equal_codes": round(float((numbers["fp32"] == numbers["int8"]).mean()), 4)} | figures
+    metrics = {f"psnr_db_{name}": round(float(psnr_db(own, truth).mean()), 2) for name, own in rebuilt.items()}
+    return {"equal_codes": round(float((numbers["fp32"] == numbers["int8"]).mean()), 4)} | metrics
 
 
 Quality = dict[str, dict[str, float]]  # signal to noise in dB, by graph and output

@@ -46,7 +46,7 @@ examples:
   python -m quantization.report --check              is every scale of the shipped bundle right? Needs no .data
   python -m quantization.report --check --int8 build/quantized
 
-figures, in dB (6 dB are one bit):
+metrics, in dB (6 dB are one bit):
   here            this tensor alone: float against quantized and dequantized
   worst channel   the same of the worst output channel of a weight
   gathered        float graph against int8 graph, with all that came before
@@ -97,7 +97,7 @@ def document(
         "float_nodes": {name: float_nodes_left(quantized / f"{name}.onnx") for name in reference},
         "saturation": [plain(asdict(layer)) for layer in saturation_report(reference, quantized, samples)],
         "saturation_8_bit": [plain(asdict(layer)) for layer in saturation_report(reference, quantized, samples, 8)],
-        "check": check.figures_of(own),
+        "check": check.metrics_of(own),
     }
 
 
@@ -201,9 +201,9 @@ def _write(arguments: argparse.Namespace, paths: tuple[Path, Path, Path], consol
         found["methods"] = json.loads(JSON.read_text()).get("methods", [])
     try:
         images = agreement.load_images(arguments.data, arguments.agreement_images)
-        figures = agreement.agreement(arguments.reference, arguments.int8, images)
-        agreement.print_figures(figures, f"labels, int8 against fp32, {arguments.data}", console)
-        found["agreement"] = plain(asdict(figures))
+        metrics = agreement.agreement(arguments.reference, arguments.int8, images)
+        agreement.print_metrics(metrics, f"labels, int8 against fp32, {arguments.data}", console)
+        found["agreement"] = plain(asdict(metrics))
     except MaquetteError as error:
         console.print(f"Label agreement was not measured: {error}")
         found["agreement"] = None

@@ -37,18 +37,18 @@ def markdown(document: dict) -> str:
         f"Bundle `{document['bundle']}` (manifest {document['fingerprint']}), {document['images']} held-out images for "
         "tensors.", "",
     ]  # fmt: skip
-    figures = document.get("agreement")
-    if figures:
+    metrics = document.get("agreement")
+    if metrics:
         lines += ["### Labels", ""]
         lines += _table(
             ("figure", "int8 against fp32"),
             [
                 (f"label agreement on person pixels (gate {100 * GATE:.0f} %, stretch {100 * STRETCH:.0f} %)",
-                 f"{100 * figures['labels']:.2f} %"),
-                ("where both paint", f"{100 * figures['parts']:.2f} %"),
-                ("mask IoU", f"{100 * figures['mask_iou']:.2f} %"),
-                ("people, fp32 / int8", f"{figures['people'][0]} / {figures['people'][1]}"),
-                ("images with as many people", f"{100 * figures['same_count']:.1f} % of {figures['images']}"),
+                 f"{100 * metrics['labels']:.2f} %"),
+                ("where both paint", f"{100 * metrics['parts']:.2f} %"),
+                ("mask IoU", f"{100 * metrics['mask_iou']:.2f} %"),
+                ("people, fp32 / int8", f"{metrics['people'][0]} / {metrics['people'][1]}"),
+                ("images with as many people", f"{100 * metrics['same_count']:.1f} % of {metrics['images']}"),
             ],
         )  # fmt: skip
     lines += ["### Outputs", ""]
@@ -97,8 +97,8 @@ def _saturation_sentence(what: str, layers: list[dict]) -> str:
 
 
 def _lowest(row: dict) -> float:
-    figures = [row["here"], row["gathered"], None if row["kind"] == "bias" else row["worst_channel"]]
-    return min((f for f in figures if f is not None), default=np.inf)
+    metrics = [row["here"], row["gathered"], None if row["kind"] == "bias" else row["worst_channel"]]
+    return min((f for f in metrics if f is not None), default=np.inf)
 
 
 def _table(head: tuple[str, ...], rows: list[tuple]) -> list[str]:

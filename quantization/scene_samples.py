@@ -49,14 +49,14 @@ def shots(captures: Sequence[Capture], count: int, held_out: bool) -> list[Shot]
 @torch.no_grad()
 def psnrs_db(networks: nn.Module, wanted: Sequence[Shot], what: str) -> list[float]:
     """The PSNR of each image, rendered with these networks, against its photo."""
-    figures = []
+    metrics = []
     for shot in tqdm(wanted, desc=what, unit="picture", leave=False):
         options = Options(up=shot.capture.up)
         views = [shot.capture.view(k) for k in shot.sources]
         model = fitted_to_views(torch.from_numpy(shot.capture.cloud.positions), views, networks, options)
         photo = shot.capture.view(shot.target)
-        figures.append(psnr_db(render(model, photo.camera, networks, options), photo.image))
-    return figures
+        metrics.append(psnr_db(render(model, photo.camera, networks, options), photo.image))
+    return metrics
 
 
 @torch.no_grad()

@@ -15,7 +15,7 @@ from benchmarks.edges.baselines import BASELINES
 from benchmarks.edges.methods import FLOAT, NOTHING, SHIPPED, Method, NoEdges, tuned_baselines
 from benchmarks.edges.views import View
 from export.edges.config import EPS_R, SHARP_R
-from export.edges.metrics import STEPS, cuts, frame_figures, summary
+from export.edges.metrics import STEPS, cuts, frame_metrics, summary
 
 LEVELS = ("clean", "tof", "stereo")  # levels with targets and baselines
 TUNING_VIEWS = 40  # number of validation views for tuning, spread evenly; thresholds of networks use all views
@@ -95,7 +95,7 @@ def metrics_of(way: Method, view: View, depth: np.ndarray) -> tuple[dict, np.nda
 
 
 def of_pixels(distance: np.ndarray, view: View, counts: np.ndarray) -> dict:
-    return frame_figures(distance, view.frame.distance, counts) | {"pixels": int(counts.sum())}
+    return frame_metrics(distance, view.frame.distance, counts) | {"pixels": int(counts.sum())}
 
 
 def of_set(test: Sequence[View], way: Method, at: Mapping[str, Mapping[float, int]]) -> list[dict]:

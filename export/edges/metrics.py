@@ -12,25 +12,25 @@ MAX_FALSE_POSITIVES = {1.0: 0.005, 4.0: 0.02}  # of pixels that are not sharp, a
 STEPS = 256  # thresholds tried between 0 and EPS_R
 
 
-def frame_figures(distance: np.ndarray, true: np.ndarray, counts: np.ndarray) -> dict[str, object]:
+def frame_metrics(distance: np.ndarray, true: np.ndarray, counts: np.ndarray) -> dict[str, object]:
     """distance, true: [H, W] in r; counts: bool [H, W]. Root mean square and 95 % quantile of the error, the first also
     over pixels within 4 r of an edge; for each threshold of SHARP_R the share of sharp pixels found and of others
     called sharp, [STEPS + 1] over where the distance is cut."""
     distance, true = np.clip(distance[counts], 0, EPS_R), true[counts]
     error = np.abs(distance - true)
-    figures: dict[str, object] = {
+    metrics: dict[str, object] = {
         "rmse_r": float(np.sqrt(np.mean(error**2))) if error.size else np.nan,
         "q95_r": float(np.quantile(error, 0.95)) if error.size else np.nan,
     }
     near = true < SHARP_R[-1]
-    figures["rmse_near_r"] = float(np.sqrt(np.mean(error[near] ** 2))) if near.any() else np.nan
+    metrics["rmse_near_r"] = float(np.sqrt(np.mean(error[near] ** 2))) if near.any() else np.nan
     at = np.minimum((distance / EPS_R * STEPS).astype(int), STEPS - 1)
     for sharp_r in SHARP_R:
         sharp = true < sharp_r
         for name, mask in (("found", sharp), ("false", ~sharp)):
             below = np.concatenate([[0], np.cumsum(np.bincount(at[mask], minlength=STEPS))])
-            figures[f"{name}_{sharp_r:g}r"] = below / mask.sum() if mask.any() else np.full(STEPS + 1, np.nan)
-    return figures
+            metrics[f"{name}_{sharp_r:g}r"] = below / mask.sum() if mask.any() else np.full(STEPS + 1, np.nan)
+    return metrics
 
 
 def cuts(frames: Sequence[Mapping[str, object]]) -> dict[float, int]:
@@ -44,11 +44,11 @@ def cuts(frames: Sequence[Mapping[str, object]]) -> dict[float, int]:
 
 def summary(frames: Sequence[Mapping[str, object]], at: Mapping[float, int]) -> dict[str, float]:
     """Means over frames, with distances cut as `cuts` of other frames says."""
-    figures = {name: float(_mean(frames, name)) for name in ("rmse_r", "rmse_near_r", "q95_r")}
+    metrics = {name: float(_mean(frames, name)) for name in ("rmse_r", "rmse_near_r", "q95_r")}
     for sharp_r in SHARP_R:
-        figures[f"recall_{sharp_r:g}r"] = float(_mean(frames, f"found_{sharp_r:g}r")[at[sharp_r]])
-        figures[f"fpr_{sharp_r:g}r"] = float(_mean(frames, f"false_{sharp_r:g}r")[at[sharp_r]])
-    return figures
+        metrics[f"recall_{sharp_r:g}r"] = float(_mean(frames, f"found_{sharp_r:g}r")[at[sharp_r]])
+        metrics[f"fpr_{sharp_r:g}r"] = float(_mean(frames, f"false_{sharp_r:g}r")[at[sharp_r]])
+    return metrics
 
 
 def _mean(frames: Sequence[Mapping[str, object]], name: str) -> np.ndarray:

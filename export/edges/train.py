@@ -122,8 +122,8 @@ class Run:
         """Adds metrics on held-out frames, where there are some, to the log and writes sample.png."""
         if not frames:
             return
-        figures = validate(self.mean.net, self.config.network.bins, frames, VALIDATED)
-        flat = {f"{name}/{level}": value for level, row in figures.items() for name, value in row.items()}
+        metrics = validate(self.mean.net, self.config.network.bins, frames, VALIDATED)
+        flat = {f"{name}/{level}": value for level, row in metrics.items() for name, value in row.items()}
         self.log.append({"step": self.step, "spent": self.spent_s, **flat})
         picture = sheet(self.mean.net, self.config.network.bins, frames[:4], VALIDATED)
         cv2.imwrite(str(self.config.out / "sample.png"), picture[..., ::-1])

@@ -14,7 +14,7 @@ from export.edges.config import EPS_R
 from export.edges.data import Frame, seen_by
 from export.edges.depth_input import folded, slopes
 from export.edges.losses import decoded
-from export.edges.metrics import cuts, frame_figures, summary
+from export.edges.metrics import cuts, frame_metrics, summary
 from export.edges.network import EdgeNetwork
 from export.solids.sensors import LEVELS
 
@@ -39,12 +39,12 @@ def field_of(network: EdgeNetwork, bins: int, decoding: str = "expectation") -> 
     return lambda depth, focal_px: decoded(network_planes(network, depth, focal_px), bins, decoding)[0][0].cpu().numpy()
 
 
-def figures_of(field: Field, frames: Sequence[Frame], level: str) -> list[dict[str, object]]:
-    """export.edges.metrics.frame_figures of each frame, as a sensor sees it."""
+def metrics_of(field: Field, frames: Sequence[Frame], level: str) -> list[dict[str, object]]:
+    """export.edges.metrics.frame_metrics of each frame, as a sensor sees it."""
     rows = []
     for frame in frames:
         seen = frame_through(level, frame)
-        rows.append(frame_figures(field(seen, frame.focal_px), frame.distance, frame.counts & (seen > 0)))
+        rows.append(frame_metrics(field(seen, frame.focal_px), frame.distance, frame.counts & (seen > 0)))
     return rows
 
 
@@ -54,7 +54,7 @@ def validate(
     """Metrics by level; distances are cut where the same frames say."""
     out = {}
     for level in levels:
-        rows = figures_of(field_of(network, bins), frames, level)
+        rows = metrics_of(field_of(network, bins), frames, level)
         out[level] = summary(rows, cuts(rows))
     return out
 

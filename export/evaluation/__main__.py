@@ -13,7 +13,7 @@ from maquette import MaquetteError
 
 from export.evaluation import photos, report
 from export.evaluation.backends import fingerprint, open_backend
-from export.evaluation.measure import Figures, image_ranges, measure
+from export.evaluation.measure import Metrics, image_ranges, measure
 from export.evaluation.plot import write_image
 from export.jobs import Workers
 from export.shards import count_images, shard_paths
@@ -28,7 +28,7 @@ examples:
   python -m export.evaluation --data .data/people/val --backends torch=.data/runs/b/weights.pt
   python -m export.evaluation --backends onnx,capi=.data/bundles/densepose-b-fp32,capi
 
-figures:
+metrics:
   box AP            COCO average precision of the boxes, at IoU .50 and averaged over .50:.05:.95
   GPS AP            the same with geodesic point similarity on the body surface (kappa 0.255 m,
                     196 pixels a person)
@@ -88,8 +88,8 @@ def run(arguments: argparse.Namespace) -> int:
     backends = [open_backend(text, arguments.score_floor) for text in texts]
     table = load_surface_table()
     photo_set = photos.PhotoSet.find(arguments.photos, arguments.labels, arguments.empty, arguments.animals)
-    results: dict[str, Figures] = {}
-    photo_results: dict[str, photos.PhotoFigures] = {}
+    results: dict[str, Metrics] = {}
+    photo_results: dict[str, photos.PhotoMetrics] = {}
     sources: dict[str, tuple[Path, str]] = {}
     for text, backend in zip(texts, backends, strict=True):
         name = report.column_name(backend.kind, backend.precision)
@@ -105,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"Largest difference between columns: {report.largest_difference(results):.2f} points")
     report.print_groups(f"people of the rendered images, {name}", results[name].groups)
     if photo_results:
-        photos.print_figures(f"real photographs, {name}", photo_results[name])
+        photos.print_metrics(f"real photographs, {name}", photo_results[name])
         report.print_groups(f"people of the photographs, {name}", photo_results[name].groups)
     else:
         print(f"No real photographs: {arguments.labels} has no labels (python -m export.teachers makes them).")

@@ -28,7 +28,7 @@ GROUPS: tuple[tuple[str, str, Callable[[PersonRecord], bool]], ...] = (
 
 
 @dataclass(frozen=True)
-class GroupFigures:
+class GroupMetrics:
     """Shares 0..1; NaN: nothing to measure.
 
     recall: fraction found at box IoU .5. part_accuracy: fraction of these people's visible pixels (in photographs:
@@ -43,14 +43,14 @@ class GroupFigures:
     mask_iou: float
 
 
-def breakdown(people: list[PersonRecord]) -> list[GroupFigures]:
+def breakdown(people: list[PersonRecord]) -> list[GroupMetrics]:
     """One entry for each group that has people in it."""
-    figures = []
+    metrics = []
     for by, name, belongs in GROUPS:
         members = [person for person in people if belongs(person)]
         if members:
-            figures.append(
-                GroupFigures(
+            metrics.append(
+                GroupMetrics(
                     by=by,
                     name=name,
                     people=len(members),
@@ -59,7 +59,7 @@ def breakdown(people: list[PersonRecord]) -> list[GroupFigures]:
                     mask_iou=mean_mask_iou(members),
                 )
             )
-    return figures
+    return metrics
 
 
 def part_accuracy(people: list[PersonRecord]) -> float:

@@ -45,7 +45,7 @@ virtual clothes and light, interaction by the body, research into dense pose.
 Not meant for recognising who somebody is or telling age, sex, health or feelings; for watching people; for anything
 where an error hurts somebody (driving, medicine, safety of machines, law). The surface under clothes is a guess.
 
-Skin, hair, clothes and poses of real people are richer than what the network learned from. How the figures differ
+Skin, hair, clothes and poses of real people are richer than what the network learned from. How the metrics differ
 between groups of real people has not been measured.
 """
 
@@ -81,17 +81,17 @@ def card(manifest: dict, digest: str, document: dict, gallery: str) -> str:
 
     Raises ValueError when the document does not hold metrics of this bundle.
     """
-    figures = column_of(document, digest)
+    metrics = column_of(document, digest)
     sections = [
         _what_it_does(manifest, digest),
         _training_data(manifest),
-        _rendered_figures(document["data"], figures),
-        _fates(figures["pixel_fates"]),
-        _groups("By group of people", "part accuracy", figures["groups"]),
-        _parts(document["part_names"], figures),
-        _calibration(document["calibration_bins"], figures["calibration"]),
-        _photo_figures(figures["photos"]),
-        _failures(figures, gallery),
+        _rendered_metrics(document["data"], metrics),
+        _fates(metrics["pixel_fates"]),
+        _groups("By group of people", "part accuracy", metrics["groups"]),
+        _parts(document["part_names"], metrics),
+        _calibration(document["calibration_bins"], metrics["calibration"]),
+        _photo_metrics(metrics["photos"]),
+        _failures(metrics, gallery),
         USES,
     ]
     return "\n".join(sections)
@@ -125,17 +125,17 @@ def _training_data(manifest: dict) -> str:
     return "## Trained on\n\n" + _table(("what", "licence", "used for"), rows)
 
 
-def _rendered_figures(data: dict, figures: dict) -> str:
+def _rendered_metrics(data: dict, metrics: dict) -> str:
     whole = "" if data["limit"] is None else f" (only the first {data['limit']} of the set)"
     text = f"""\
-## Figures on rendered people
+## Metrics on rendered people
 
-{figures["images"]} rendered images{whole}, {figures["people"]} people; {figures["ignored"]} more are
+{metrics["images"]} rendered images{whole}, {metrics["people"]} people; {metrics["ignored"]} more are
 too small or hidden to be asked for. AP and calibration are over scores from {data["score_floor"]:g} up, the rest at
-{figures["threshold"]:g} or better. Fractions are in percent. Definitions: `python -m export.evaluation --help`.
+{metrics["threshold"]:g} or better. Fractions are in percent. Definitions: `python -m export.evaluation --help`.
 
 """
-    rows = [(label, _number(figures[field], unit)) for label, field, unit in ROWS if unit != "ms"]
+    rows = [(label, _number(metrics[field], unit)) for label, field, unit in ROWS if unit != "ms"]
     return text + _table(("figure", "value"), rows)
 
 
@@ -155,13 +155,13 @@ def _groups(title: str, accuracy: str, groups: list[dict]) -> str:
     return f"### {title}\n\n{text}" + _table(("people", "number", "recall", accuracy, "mask IoU"), rows)
 
 
-def _parts(names: list[str], figures: dict) -> str:
+def _parts(names: list[str], metrics: dict) -> str:
     rows = [
         (
             names[part],
-            _number(figures["part_recall"][part], "points"),
-            _number(figures["part_precision"][part], "points"),
-            _number(figures["part_error_cm"][part], "cm"),
+            _number(metrics["part_recall"][part], "points"),
+            _number(metrics["part_precision"][part], "points"),
+            _number(metrics["part_error_cm"][part], "cm"),
         )
         for part in range(1, len(names))
     ]
@@ -190,7 +190,7 @@ def _calibration(bins: int, calibration: dict) -> str:
     return f"### Calibration of scores\n\n{text}" + _table(("score", "detections", "mean score", "right"), rows)
 
 
-def _photo_figures(photos: dict | None) -> str:
+def _photo_metrics(photos: dict | None) -> str:
     title = "## Figures on real photographs\n\n"
     if photos is None:
         return title + "Not measured.\n"
@@ -215,21 +215,21 @@ Definitions: `python -m export.evaluation.photos --help`.
     return title + text + _table(("figure", "value"), rows) + "\n" + groups
 
 
-def _failures(figures: dict, gallery: str) -> str:
+def _failures(metrics: dict, gallery: str) -> str:
     text = f"""\
 ## Known failures
 
-The worst cases of the rendered test images, chosen by their figures: image with the person or box in question on the
+The worst cases of the rendered test images, chosen by their metrics: image with the person or box in question on the
 left, what is painted on the right. The images show fabrics and backgrounds under the licences named above.
 
 ![Worst cases]({gallery})
 
 """
-    if figures["photos"] is None:
+    if metrics["photos"] is None:
         return text
     rows = []
     for kind, title in KINDS.items():
-        cases = figures["photos"]["failures"][kind][:CASES_IN_WORDS]
+        cases = metrics["photos"]["failures"][kind][:CASES_IN_WORDS]
         told = "; ".join(f"`{case['image']}` {CAPTIONS[kind].format(case['figure'])}" for case in cases)
         rows.append((title, told or "none"))
     intro = "In the photographs (`python -m export.photos people` fetches them; most may not be redistributed):\n\n"

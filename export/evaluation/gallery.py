@@ -58,9 +58,9 @@ def main(argv: list[str] | None = None) -> int:
     try:
         document = json.loads(arguments.evaluation.read_text())
         backend = open_backend(arguments.backend, 0.05)
-        figures = column_of(document, fingerprint(backend.path))
+        metrics = column_of(document, fingerprint(backend.path))
         rows = [
-            draw_kind(kind, backend, document["data"], figures, arguments.cases, arguments.all_photos) for kind in KINDS
+            draw_kind(kind, backend, document["data"], metrics, arguments.cases, arguments.all_photos) for kind in KINDS
         ]
     except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"No gallery was drawn: {error}", file=sys.stderr)
@@ -68,22 +68,22 @@ def main(argv: list[str] | None = None) -> int:
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(arguments.out), np.vstack(rows)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     print(f"{arguments.out}: {arguments.out.stat().st_size / 1e3:.0f} kB")
-    for kind in KINDS if figures["photos"] else ():
+    for kind in KINDS if metrics["photos"] else ():
         print(f"photographs, {KINDS[kind]}:")
-        for case in figures["photos"]["failures"][kind]:
+        for case in metrics["photos"]["failures"][kind]:
             print(f"  {case['image']}: {CAPTIONS[kind].format(case['figure'])}")
     return 0
 
 
-def draw_kind(kind: str, backend: Backend, data: dict, figures: dict, count: int, all_photos: bool) -> np.ndarray:
+def draw_kind(kind: str, backend: Backend, data: dict, metrics: dict, count: int, all_photos: bool) -> np.ndarray:
     """The worst cases of one kind: at most `count` rendered images, then the photographs that may be shown.
 
-    data, figures: as in evaluation.json. Returns uint8 [H, COLUMNS * tile width, 3] RGB: a title and rows of tiles.
+    data, metrics: as in evaluation.json. Returns uint8 [H, COLUMNS * tile width, 3] RGB: a title and rows of tiles.
     """
     shown = [
-        (case, read_image(Path(data["folder"]), case["image"]).image) for case in figures["failures"][kind][:count]
+        (case, read_image(Path(data["folder"]), case["image"]).image) for case in metrics["failures"][kind][:count]
     ]
-    for case in figures["photos"]["failures"][kind] if figures["photos"] else ():
+    for case in metrics["photos"]["failures"][kind] if metrics["photos"] else ():
         path = REDISTRIBUTABLE.get(case["image"])
         if path is None and all_photos:
             folders = (Path(data["photos"]), Path(data["empty"]))

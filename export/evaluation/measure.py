@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from export.evaluation.average_precision import THRESHOLDS, ImageMatches, average_precision
 from export.evaluation.backends import Backend, Prediction, open_backend
-from export.evaluation.breakdown import GroupFigures, breakdown, left_right
+from export.evaluation.breakdown import GroupMetrics, breakdown, left_right
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.people import FalseAlarm, PersonRecord, compare, rendered_people
@@ -28,7 +28,7 @@ IMAGES_A_JOB = 50
 
 
 @dataclass(frozen=True)
-class Figures:
+class Metrics:
     """One backend's metrics. Shares are 0..1, errors in cm, times in seconds; NaN: nothing to measure.
 
     ap_box, ap_gps, ap_gpsm: mean over THRESHOLDS; *_by_threshold: at each. AP and calibration are over all scores, the
@@ -65,7 +65,7 @@ class Figures:
     part_precision: list[float]
     part_error_cm: list[float]
     calibration: Calibration
-    groups: list[GroupFigures]
+    groups: list[GroupMetrics]
     failures: dict[str, list[Case]]
 
 
@@ -112,7 +112,7 @@ class Tally:
         self.ignored += other.ignored
         self.seconds += other.seconds
 
-    def figures(self, table: SurfaceTable) -> Figures:
+    def metrics(self, table: SurfaceTable) -> Metrics:
         surface = self.points.solve(table)
         gps = surface.similarity()
         gpsm = [np.sqrt(similarity * mask) for similarity, mask in zip(gps, self.masks, strict=True)]
@@ -122,7 +122,7 @@ class Tally:
         right_part, painted = surface.median_error_cm(visible)
         du, dv = self.pixels.median_difference()
         right = sum(person.found for person in self.people)
-        return Figures(
+        return Metrics(
             images=len(self.matches),
             people=len(self.people),
             ignored=self.ignored,
@@ -185,7 +185,7 @@ def image_ranges(
     return ranges
 
 
-def measure(ranges: list[ImageRange], table: SurfaceTable, workers: Workers) -> Figures:
+def measure(ranges: list[ImageRange], table: SurfaceTable, workers: Workers) -> Metrics:
     """Raises ValueError when a backend's answers are no predictions of the images."""
     tallies = {}
     name = ranges[0].backend
@@ -196,7 +196,7 @@ def measure(ranges: list[ImageRange], table: SurfaceTable, workers: Workers) -> 
     first, *others = (tallies[r] for r in ranges)
     for other in others:
         first.merge(other)
-    return first.figures(table)
+    return first.metrics(table)
 
 
 def _tally(images: ImageRange) -> Tally:

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from export.evaluation.average_precision import ImageMatches, ranked
 from export.evaluation.backends import Backend, Prediction, fingerprint, open_backend
-from export.evaluation.breakdown import GroupFigures, breakdown, left_right, mean_mask_iou, part_accuracy
+from export.evaluation.breakdown import GroupMetrics, breakdown, left_right, mean_mask_iou, part_accuracy
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.json_values import plain
@@ -60,7 +60,7 @@ _ALLOWED = {
 }  # fmt: skip
 
 EPILOG = """\
-figures:
+metrics:
   recall at precision .9   of people taller than 64 px whom the teacher's detector gives a score of .5 or more;
                            smaller and less sure ones count neither way
   mask IoU                 mean over people with a teacher's mask; nobody found there counts as 0
@@ -98,7 +98,7 @@ class PhotoSet:
 
 
 @dataclass(frozen=True)
-class PhotoFigures:
+class PhotoMetrics:
     """Fractions 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: fraction right by
     landmark name. groups, failures: as for rendered images, with landmarks in place of pixels."""
 
@@ -118,7 +118,7 @@ class PhotoFigures:
     false_people_by_animals: float
     landmark: dict[str, float]
     calibration: Calibration
-    groups: list[GroupFigures]
+    groups: list[GroupMetrics]
     failures: dict[str, list[Case]]
 
 
@@ -199,9 +199,9 @@ class Tally:
             self.empty += 1
             self.in_empty += alarms
 
-    def figures(self) -> PhotoFigures:
+    def metrics(self) -> PhotoMetrics:
         right = sum(person.found for person in self.people)
-        return PhotoFigures(
+        return PhotoMetrics(
             photos=self.photos,
             people=len(self.people),
             masks=sum(not np.isnan(person.mask_iou) for person in self.people),
@@ -248,7 +248,7 @@ def recall_at_precision(matches: list[ImageMatches], precision: float) -> float:
     return float(found[enough].max(initial=0) / wanted)
 
 
-def measure(backend: Backend, chosen: PhotoSet) -> PhotoFigures:
+def measure(backend: Backend, chosen: PhotoSet) -> PhotoMetrics:
     tally = Tally(backend.threshold)
     total = len(chosen.photos) + len(chosen.empty) + len(chosen.animals)
     with tqdm(total=total, desc=f"{backend.kind} {backend.precision}", unit="photo", disable=None) as bar:
@@ -259,7 +259,7 @@ def measure(backend: Backend, chosen: PhotoSet) -> PhotoFigures:
         for path in chosen.empty + chosen.animals:
             tally.add_empty(path.name, backend.predict(read_photo(path)), path in chosen.animals)
             bar.update()
-    return tally.figures()
+    return tally.metrics()
 
 
 def read_photo(path: Path) -> np.ndarray:
@@ -305,9 +305,9 @@ def main(argv: list[str] | None = None) -> int:
         for text in arguments.backends.split(","):
             backend = open_backend(text, 0.05)
             name = f"{backend.precision} {backend.kind} {backend.path}"
-            figures = measure(backend, chosen)
-            results[name] = {"model": fingerprint(backend.path), **plain(figures)}
-            print_figures(name, figures)
+            metrics = measure(backend, chosen)
+            results[name] = {"model": fingerprint(backend.path), **plain(metrics)}
+            print_metrics(name, metrics)
     except (MaquetteError, FileNotFoundError, ValueError) as error:
         print(f"Evaluation stopped: {error}", file=sys.stderr)
         return 1
@@ -317,7 +317,7 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def print_figures(name: str, figures: PhotoFigures) -> None:
+def print_metrics(name: str, metrics: PhotoMetrics) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -325,15 +325,15 @@ def print_figures(name: str, figures: PhotoFigures) -> None:
     table.add_column("")
     table.add_column("", justify="right")
     rows = [
-        (f"recall at precision {PRECISION:g} ({figures.people} people)", figures.recall_at_precision),
-        ("recall, precision as shown", (figures.recall_shown, figures.precision_shown)),
-        (f"mask IoU ({figures.masks} people)", figures.mask_iou),
-        ("part at landmark", figures.part_at_landmark),
-        ("left/right", figures.left_right),
-        ("chest or back", figures.chest_or_back),
-        (f"false people a photo ({figures.empty_photos} photos)", figures.false_people),
-        (f"false people a photo of animals ({figures.animal_photos} photos)", figures.false_people_by_animals),
-        *figures.landmark.items(),
+        (f"recall at precision {PRECISION:g} ({metrics.people} people)", metrics.recall_at_precision),
+        ("recall, precision as shown", (metrics.recall_shown, metrics.precision_shown)),
+        (f"mask IoU ({metrics.masks} people)", metrics.mask_iou),
+        ("part at landmark", metrics.part_at_landmark),
+        ("left/right", metrics.left_right),
+        ("chest or back", metrics.chest_or_back),
+        (f"false people a photo ({metrics.empty_photos} photos)", metrics.false_people),
+        (f"false people a photo of animals ({metrics.animal_photos} photos)", metrics.false_people_by_animals),
+        *metrics.landmark.items(),
     ]
     for label, value in rows:
         values = value if isinstance(value, tuple) else (value,)

@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 
 from export.evaluation.average_precision import THRESHOLDS
 from export.evaluation.calibration import BINS
-from export.evaluation.measure import Figures
-from export.evaluation.photos import PhotoFigures
+from export.evaluation.measure import Metrics
+from export.evaluation.photos import PhotoMetrics
 from export.surface import PART_COUNT, PART_NAMES
 
 SHARES_OF_PHOTOS = (
@@ -27,7 +27,7 @@ SHARES_OF_PHOTOS = (
 )
 
 
-def write_image(path: Path, results: dict[str, Figures], photo_results: dict[str, PhotoFigures]) -> None:
+def write_image(path: Path, results: dict[str, Metrics], photo_results: dict[str, PhotoMetrics]) -> None:
     """AP, calibration, groups and photographs above; the body parts below. One colour a column of the table; groups
     are those of the last column. photo_results may be empty."""
     figure = pyplot.figure(figsize=(18, 14), layout="constrained")
@@ -45,10 +45,10 @@ def write_image(path: Path, results: dict[str, Figures], photo_results: dict[str
     pyplot.close(figure)
 
 
-def _draw_precision(axes: Axes, results: dict[str, Figures]) -> None:
-    for k, (name, figures) in enumerate(results.items()):
-        curves = (("box", "--", figures.ap_box_by_threshold), ("GPS", "-", figures.ap_gps_by_threshold))
-        curves += (("GPSm", ":", figures.ap_gpsm_by_threshold),)
+def _draw_precision(axes: Axes, results: dict[str, Metrics]) -> None:
+    for k, (name, metrics) in enumerate(results.items()):
+        curves = (("box", "--", metrics.ap_box_by_threshold), ("GPS", "-", metrics.ap_gps_by_threshold))
+        curves += (("GPSm", ":", metrics.ap_gpsm_by_threshold),)
         for kind, style, values in curves:
             axes.plot(THRESHOLDS, values, style, color=f"C{k}", label=f"{name}: {kind}")
     axes.set(title="average precision", xlabel="similarity threshold", ylim=(0, 1), xlim=(0.5, 0.95))
@@ -56,10 +56,10 @@ def _draw_precision(axes: Axes, results: dict[str, Figures]) -> None:
     axes.legend(fontsize=8)
 
 
-def _draw_calibration(axes: Axes, results: dict[str, Figures]) -> None:
+def _draw_calibration(axes: Axes, results: dict[str, Metrics]) -> None:
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
-    for k, (name, figures) in enumerate(results.items()):
-        table = figures.calibration
+    for k, (name, metrics) in enumerate(results.items()):
+        table = metrics.calibration
         label = f"{name}: expected error {table.expected_error:.3f}"
         axes.plot(table.mean_score, table.fraction_right, "o-", color=f"C{k}", label=label)
     counts = axes.twinx()
@@ -73,8 +73,8 @@ def _draw_calibration(axes: Axes, results: dict[str, Figures]) -> None:
     axes.legend(fontsize=8, loc="upper left")
 
 
-def _draw_groups(axes: Axes, name: str, figures: Figures) -> None:
-    groups = figures.groups
+def _draw_groups(axes: Axes, name: str, metrics: Metrics) -> None:
+    groups = metrics.groups
     place = np.arange(len(groups))
     for k, (field, label) in enumerate(
         (("recall", "recall at IoU .5"), ("part_accuracy", "part accuracy"), ("mask_iou", "mask IoU"))
@@ -91,7 +91,7 @@ def _draw_groups(axes: Axes, name: str, figures: Figures) -> None:
     axes.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.05))
 
 
-def _draw_photos(axes: Axes, results: dict[str, PhotoFigures]) -> None:
+def _draw_photos(axes: Axes, results: dict[str, PhotoMetrics]) -> None:
     axes.set_title("real photographs")
     if not results:
         axes.text(0.5, 0.5, "not measured", ha="center", va="center", transform=axes.transAxes)
@@ -99,25 +99,25 @@ def _draw_photos(axes: Axes, results: dict[str, PhotoFigures]) -> None:
         return
     place = np.arange(len(SHARES_OF_PHOTOS))
     width = 0.8 / len(results)
-    for k, (name, figures) in enumerate(results.items()):
-        values = [getattr(figures, field) for _, field in SHARES_OF_PHOTOS]
-        label = f"{name}; {figures.false_people:.2f} false people a photo without any"
+    for k, (name, metrics) in enumerate(results.items()):
+        values = [getattr(metrics, field) for _, field in SHARES_OF_PHOTOS]
+        label = f"{name}; {metrics.false_people:.2f} false people a photo without any"
         axes.bar(place + (k - (len(results) - 1) / 2) * width, values, width, color=f"C{k}", label=label)
     axes.set_xticks(place, [label.replace(" ", "\n") for label, _ in SHARES_OF_PHOTOS], fontsize=8)
-    axes.set(ylim=(0, 1), xlabel=f"{figures.photos} photos, {figures.people} people, {figures.masks} with a mask")
+    axes.set(ylim=(0, 1), xlabel=f"{metrics.photos} photos, {metrics.people} people, {metrics.masks} with a mask")
     axes.grid(axis="y", alpha=0.3)
     axes.legend(fontsize=7, loc="upper right")
 
 
-def _draw_parts(above: Axes, below: Axes, results: dict[str, Figures]) -> None:
+def _draw_parts(above: Axes, below: Axes, results: dict[str, Metrics]) -> None:
     """Recall (bars) and precision (dots) of each part above, its surface error below."""
     width = 0.8 / len(results)
-    for k, (name, figures) in enumerate(results.items()):
+    for k, (name, metrics) in enumerate(results.items()):
         place = np.arange(1, PART_COUNT + 1) + (k - (len(results) - 1) / 2) * width
-        above.bar(place, figures.part_recall[1:], width, color=f"C{k}", alpha=0.7, label=f"{name}: recall")
-        above.plot(place, figures.part_precision[1:], "o", color=f"C{k}", markeredgecolor="k", markersize=5,
+        above.bar(place, metrics.part_recall[1:], width, color=f"C{k}", alpha=0.7, label=f"{name}: recall")
+        above.plot(place, metrics.part_precision[1:], "o", color=f"C{k}", markeredgecolor="k", markersize=5,
                    label=f"{name}: precision")  # fmt: skip
-        below.bar(place, figures.part_error_cm[1:], width, color=f"C{k}", alpha=0.7)
+        below.bar(place, metrics.part_error_cm[1:], width, color=f"C{k}", alpha=0.7)
     above.set(title="body parts", ylabel="fraction of pixels", ylim=(0, 1))
     below.set_ylabel("median surface error, cm")
     above.legend(fontsize=8, ncols=len(results))

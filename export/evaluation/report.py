@@ -11,12 +11,12 @@ from rich.console import Console
 from rich.table import Table
 
 from export.evaluation.average_precision import THRESHOLDS
-from export.evaluation.breakdown import GroupFigures
+from export.evaluation.breakdown import GroupMetrics
 from export.evaluation.calibration import BINS
 from export.evaluation.json_values import plain
 from export.evaluation.machine import describe_machine
-from export.evaluation.measure import Figures
-from export.evaluation.photos import PhotoFigures
+from export.evaluation.measure import Metrics
+from export.evaluation.photos import PhotoMetrics
 from export.surface import PART_NAMES
 
 SCHEMA = "maquette-evaluation-2"
@@ -49,7 +49,7 @@ def column_name(kind: str, precision: str) -> str:
     return f"{precision} {kind}"
 
 
-def print_table(results: dict[str, Figures], console: Console | None = None) -> None:
+def print_table(results: dict[str, Metrics], console: Console | None = None) -> None:
     """results: metrics by column name; the first column is what the others are compared with."""
     console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
     first = next(iter(results.values()))
@@ -64,7 +64,7 @@ def print_table(results: dict[str, Figures], console: Console | None = None) -> 
     for name in list(results)[1:]:
         table.add_column(f"{name}: difference", justify="right")
     for label, field, unit in ROWS:
-        values = [getattr(figures, field) * {"points": 100, "ms": 1000}.get(unit, 1) for figures in results.values()]
+        values = [getattr(metrics, field) * {"points": 100, "ms": 1000}.get(unit, 1) for metrics in results.values()]
         _add_row(table, label, unit, values)
     _add_row(table, "calibration error", "points", [100 * f.calibration.expected_error for f in results.values()])
     console.print(table)
@@ -81,17 +81,17 @@ def _text(value: float, unit: str, signed: bool = False) -> str:
     return FORMATS[unit].replace("{:", "{:+" if signed else "{:").format(value)
 
 
-def largest_difference(results: dict[str, Figures]) -> float:
+def largest_difference(results: dict[str, Metrics]) -> float:
     """In points, over all rows in points, between any two columns; 0 for one column."""
     spans = [0.0]
     for _, field, unit in ROWS:
-        values = [getattr(figures, field) for figures in results.values()]
+        values = [getattr(metrics, field) for metrics in results.values()]
         if unit == "points" and not np.isnan(values).any():
             spans.append(100 * (max(values) - min(values)))
     return max(spans)
 
 
-def print_groups(title: str, groups: list[GroupFigures], console: Console | None = None) -> None:
+def print_groups(title: str, groups: list[GroupMetrics], console: Console | None = None) -> None:
     """Metrics by size, truncation, crowding and visibility."""
     console = console or Console(width=None if sys.stdout.isatty() else WIDTH_OF_FILES)
     table = Table(title=title, title_justify="left")
@@ -109,8 +109,8 @@ def print_groups(title: str, groups: list[GroupFigures], console: Console | None
 
 def write_json(
     path: Path,
-    results: dict[str, Figures],
-    photo_results: dict[str, PhotoFigures],
+    results: dict[str, Metrics],
+    photo_results: dict[str, PhotoMetrics],
     sources: dict[str, tuple[Path, str]],
     data: dict,
 ) -> None:
@@ -125,13 +125,13 @@ def write_json(
         "results": {},
         "largest_difference_points": round(largest_difference(results), 3),
     }
-    for name, figures in results.items():
+    for name, metrics in results.items():
         model, digest = sources[name]
         photos = photo_results.get(name)
         document["results"][name] = {
             "model": str(model),
             "fingerprint": digest,
-            **plain(figures),
+            **plain(metrics),
             "photos": None if photos is None else plain(photos),
         }
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -144,9 +144,9 @@ def column_of(document: dict, digest: str) -> dict:
     Raises ValueError for files of another schema and when that model was not measured.
     """
     if document.get("schema") != SCHEMA:
-        raise ValueError(f"the figures are of schema {document.get('schema')}, not {SCHEMA}; measure again.")
-    for figures in document["results"].values():
-        if figures["fingerprint"] == digest:
-            return figures
+        raise ValueError(f"the metrics are of schema {document.get('schema')}, not {SCHEMA}; measure again.")
+    for metrics in document["results"].values():
+        if metrics["fingerprint"] == digest:
+            return metrics
     measured = ", ".join(f"{f['model']} {f['fingerprint']}" for f in document["results"].values())
-    raise ValueError(f"the figures are of {measured}, not of the model {digest}; run `python -m export.evaluation`.")
+    raise ValueError(f"the metrics are of {measured}, not of the model {digest}; run `python -m export.evaluation`.")

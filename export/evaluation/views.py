@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 from export.evaluation.backends import Backend, Prediction, open_backend
-from export.evaluation.photos import PhotoSet, Tally, print_figures, read_photo
+from export.evaluation.photos import PhotoSet, Tally, print_metrics, read_photo
 from export.photos.packages import PackageReader, fetch, load_packages
 from export.teachers.label import PhotoLabels
 
@@ -131,7 +131,7 @@ def equal_points(a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> tupl
 
 
 @dataclass(frozen=True)
-class ViewFigures:
+class ViewMetrics:
     """median_px: of equal points; random_px: of pixels paired at random within their part; gain: 1 - their ratio;
     pairs: of images; matched: fraction of the asked pixels with a partner."""
 
@@ -142,7 +142,7 @@ class ViewFigures:
     matched: float
 
 
-def judge_views(labels: dict[str, dict[int, np.ndarray]], cameras: list[CalibratedCamera]) -> ViewFigures:
+def judge_views(labels: dict[str, dict[int, np.ndarray]], cameras: list[CalibratedCamera]) -> ViewMetrics:
     """labels: by moment and camera number (from 0), of one person."""
     rng = np.random.default_rng(0)
     equal, random, pairs, asked = [], [], 0, 0
@@ -158,15 +158,15 @@ def judge_views(labels: dict[str, dict[int, np.ndarray]], cameras: list[Calibrat
                 there = cameras[j].rays(in_b, b.shape[:2])
                 kept.append(epipolar_distance(cameras[i], cameras[j], rays, there, focal))
     if not asked or not sum(map(len, equal)):
-        return ViewFigures(float("nan"), float("nan"), float("nan"), pairs, 0.0)
+        return ViewMetrics(float("nan"), float("nan"), float("nan"), pairs, 0.0)
     every, chance = np.concatenate(equal), np.concatenate(random)
     median, by_chance = float(np.median(every)), float(np.median(chance))
-    return ViewFigures(median, by_chance, 1 - median / by_chance, pairs, len(every) / asked)
+    return ViewMetrics(median, by_chance, 1 - median / by_chance, pairs, len(every) / asked)
 
 
 def judge(
     predict: Callable[[Path], Prediction], threshold: float, chosen: PhotoSet, cameras: list[CalibratedCamera]
-) -> tuple[ViewFigures, Tally]:
+) -> tuple[ViewMetrics, Tally]:
     """predict: what is found in a photo of `chosen`; each is called once, in order."""
     tally, labels = Tally(threshold), {}
     for path in chosen.photos:
@@ -206,13 +206,13 @@ def main() -> None:
                 return backend.predict(read_photo(path))
 
             views, tally = judge(predict, backend.threshold, chosen, cameras)
-        figures, name = tally.figures(), f"{backend.precision} {backend.kind} {backend.path}"
-        print_figures(name, figures)
+        metrics, name = tally.metrics(), f"{backend.precision} {backend.kind} {backend.path}"
+        print_metrics(name, metrics)
         print(f"views: median {views.median_px:.1f} px, at random in a part {views.random_px:.1f} px, "
               f"gain {views.gain:.2f} ({views.pairs} pairs, {views.matched:.0%} of the points matched)")  # fmt: skip
-        results[name] = {**vars(views), "mask_iou": figures.mask_iou, "part_at_landmark": figures.part_at_landmark,
-                         "left_right": figures.left_right, "chest_or_back": figures.chest_or_back,
-                         "people": figures.people}  # fmt: skip
+        results[name] = {**vars(views), "mask_iou": metrics.mask_iou, "part_at_landmark": metrics.part_at_landmark,
+                         "left_right": metrics.left_right, "chest_or_back": metrics.chest_or_back,
+                         "people": metrics.people}  # fmt: skip
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(results, indent=1) + "\n")
 

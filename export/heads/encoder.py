@@ -112,7 +112,7 @@ SCALES = {"point": 0.3, "coarse": 1.0, "matte": 1.0, "normal": 0.3}
 
 
 @torch.no_grad()
-def figures(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, float]:
+def metrics(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, float]:
     """Mean and median error of template points (mm), those within two of their sigmas, IoU of mattes, degrees."""
     on = matte > 0.6
     away = (cells[..., POINT] - template).norm(dim=-1)[on] * 100
@@ -154,7 +154,7 @@ def photo_losses(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor,
 
 
 @torch.no_grad()
-def photo_figures(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor, matte: Tensor) -> dict[str, float]:
+def photo_metrics(cells: Tensor, pixel: Tensor, template: Tensor, weight: Tensor, matte: Tensor) -> dict[str, float]:
     """Weighted mean and median (mm) of how far template points at the face points are from the teacher's, those within
     two sigmas, IoU of mattes where known."""
     found = at_pixels(cells, pixel)

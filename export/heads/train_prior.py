@@ -117,7 +117,7 @@ def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tenso
 
 
 @dataclass(frozen=True)
-class FitFigures:
+class FitMetrics:
     """Mean distance of true points to the fitted surface, mm, of heads whose codes were fitted to their true points."""
 
     head_mm: float
@@ -154,7 +154,7 @@ def fitted_codes(bases: FieldBases, data: HeadTensors, steps: int = 250) -> tupl
 
 
 @torch.no_grad()
-def fit_figures(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> FitFigures:
+def fit_metrics(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> FitMetrics:
     """Errors of heads with these codes, beside the error of the mean head."""
     before = _distance_mm(bases, data, torch.zeros_like(z), torch.zeros_like(c))
     after = _distance_mm(bases, data, z, c)
@@ -162,7 +162,7 @@ def fit_figures(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> F
     logits, template = surface(bases.shape, weights, data.surface, geometry(bases.shape, weights, data.surface))
     colour = (logits.sigmoid() - data.colour.float() / 255).abs().mean()
     away = (template - data.template).norm(dim=-1).mean() * 100
-    return FitFigures(*after, *before, float(colour), float(away))
+    return FitMetrics(*after, *before, float(colour), float(away))
 
 
 def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> tuple[float, float]:
@@ -284,10 +284,10 @@ def train(arguments: argparse.Namespace) -> None:
     def validated() -> None:
         begun = time.monotonic()
         bases, *_ = whitened(training)
-        figures = asdict(fit_figures(bases, held_out, *fitted_codes(bases, held_out)))
-        row = {"step": training.step, "spent": training.spent_s} | figures
+        metrics = asdict(fit_metrics(bases, held_out, *fitted_codes(bases, held_out)))
+        row = {"step": training.step, "spent": training.spent_s} | metrics
         training.log.append(row)
-        write_log(training.log, arguments.out, list(figures), "spent", "held-out heads, mm")
+        write_log(training.log, arguments.out, list(metrics), "spent", "held-out heads, mm")
         bar.write(" ".join(f"{k}={v:.4g}" for k, v in row.items()) + f" ({time.monotonic() - begun:.0f} s)")
 
     while not schedule.finished(training.step, training.spent_s) and not stop:

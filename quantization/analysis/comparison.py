@@ -151,7 +151,7 @@ def worst_first(errors: list[TensorError]) -> list[TensorError]:
     """By the lowest of each tensor's metrics. A bias counts as a whole: channels that are nearly zero do no harm."""
 
     def key(error: TensorError) -> float:
-        figures = [error.here, error.gathered, None if error.kind == "bias" else error.worst_channel]
-        return min(figure for figure in figures if figure is not None)
+        metrics = [error.here, error.gathered, None if error.kind == "bias" else error.worst_channel]
+        return min(figure for figure in metrics if figure is not None)
 
     return sorted(errors, key=key)

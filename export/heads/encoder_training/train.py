@@ -27,10 +27,10 @@ from export.heads.encoder import (
     POINT,
     SCALES,
     HeadEncoder,
-    figures,
     losses,
-    photo_figures,
+    metrics,
     photo_losses,
+    photo_metrics,
     start_from_detector,
     start_from_encoder,
 )
@@ -186,9 +186,9 @@ def train(options: argparse.Namespace) -> None:
             skipped += 1
         step += 1
         if step in (1, 20) or step % 100 == 0:
-            found = figures(cells[: len(made[0])].detach(), *made[1:])
+            found = metrics(cells[: len(made[0])].detach(), *made[1:])
             if real is not None:
-                found |= photo_figures(cells[len(made[0]) :].detach(), *real[1:])
+                found |= photo_metrics(cells[len(made[0]) :].detach(), *real[1:])
             now = synchronized_s(device)
             log.append(
                 {"step": step, "seconds": round(now - started, 1), "loss": smoothed.loss, "skipped": skipped} | found

@@ -26,7 +26,7 @@ from export.heads.encoder import (
     UNKNOWN_MATTE,
     at_pixels,
     load_encoder,
-    photo_figures,
+    photo_metrics,
     run_encoder,
 )
 from export.heads.encoder_data import placing
@@ -117,10 +117,10 @@ def main() -> None:
     encoder, crops = load_encoder(arguments.encoder), faces_of(arguments.photos, arguments.split)
     answers = np.stack([run_encoder(encoder, crop.image) for crop in crops])
     labels = batched_photos(crops)[1:]
-    every = photo_figures(torch.from_numpy(answers), *labels)
+    every = photo_metrics(torch.from_numpy(answers), *labels)
     print(f"{len(crops)} faces: " + " ".join(f"{name}={value:.3g}" for name, value in every.items()))
     for k in range(len(crops)):
-        one = photo_figures(torch.from_numpy(answers[k : k + 1]), *(label[k : k + 1] for label in labels))
+        one = photo_metrics(torch.from_numpy(answers[k : k + 1]), *(label[k : k + 1] for label in labels))
         print(f"  face {k}: mean {one['photo_mm']:.1f} mm, median {one['photo_median_mm']:.1f} mm")
     if arguments.sheet:
         sheet = np.vstack([row_of(crop, cells) for crop, cells in zip(crops, answers, strict=True)])

@@ -13,8 +13,8 @@ def segment(y_m: float, from_m: float = 0.0, to_m: float = 0.4) -> np.ndarray:
 
 
 def test_the_same_curves_have_the_best_score():
-    figures = score([segment(0.0)], [segment(0.0)], FOCAL_PX)
-    assert figures == {"precision": 1, "recall": 1, "f_score": 1, "chamfer_r": 0, "hausdorff_r": 0}
+    metrics = score([segment(0.0)], [segment(0.0)], FOCAL_PX)
+    assert metrics == {"precision": 1, "recall": 1, "f_score": 1, "chamfer_r": 0, "hausdorff_r": 0}
 
 
 def test_a_curve_counts_within_two_footprints():
@@ -24,13 +24,13 @@ def test_a_curve_counts_within_two_footprints():
 
 
 def test_shares_are_by_length():
-    figures = score([segment(0.0, 0.0, 0.1)], [segment(0.0)], FOCAL_PX)
-    assert figures["precision"] == 1
-    assert figures["recall"] == pytest.approx(0.26, abs=0.003)  # a quarter, and 2 r more
-    assert figures["hausdorff_r"] == FARTHEST_R
-    figures = score([segment(0.0), segment(0.1, 0.0, 0.2)], [segment(0.0)], FOCAL_PX)
-    assert figures["precision"] == pytest.approx(2 / 3, abs=0.003)
-    assert figures["recall"] == 1
+    metrics = score([segment(0.0, 0.0, 0.1)], [segment(0.0)], FOCAL_PX)
+    assert metrics["precision"] == 1
+    assert metrics["recall"] == pytest.approx(0.26, abs=0.003)  # a quarter, and 2 r more
+    assert metrics["hausdorff_r"] == FARTHEST_R
+    metrics = score([segment(0.0), segment(0.1, 0.0, 0.2)], [segment(0.0)], FOCAL_PX)
+    assert metrics["precision"] == pytest.approx(2 / 3, abs=0.003)
+    assert metrics["recall"] == 1
 
 
 def test_cutting_a_curve_in_pieces_changes_nothing():

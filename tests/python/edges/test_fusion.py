@@ -34,7 +34,7 @@ def values(*columns: tuple[float, ...]) -> Values:
     return Values(rows, np.ones_like(rows))
 
 
-def test_the_figures_that_the_runtime_is_compared_with_are_those_of_this_reference():
+def test_the_metrics_that_the_runtime_is_compared_with_are_those_of_this_reference():
     stored, now = json.loads(FILE.read_text()), made()
     for name in ("points", "normals", "distance_m", "views_of_point", "origin"):
         np.testing.assert_allclose(stored[name], now[name], atol=2e-6, err_msg=name)

@@ -1,4 +1,4 @@
-"""Training of the edge network learns, resumes where it stopped, and its figures tell good fields from bad ones."""
+"""Training of the edge network learns, resumes where it stopped, and its metrics tell good fields from bad ones."""
 
 import json
 import os
@@ -12,8 +12,8 @@ from box_crops import write_crops
 from export.edges import train
 from export.edges.data import Batches, RecordError, read_frames
 from export.edges.device_batches import DeviceBatches
-from export.edges.metrics import cuts, frame_figures, summary
-from export.edges.validation import figures_of
+from export.edges.metrics import cuts, frame_metrics, summary
+from export.edges.validation import metrics_of
 from export.edges.weights import load_network
 from export.solids.compact import write_compact
 from export.solids.records import read_records
@@ -150,19 +150,19 @@ def test_crops_that_do_not_fit_are_refused(crops, crop, batch, wanted):
 def test_the_true_field_is_perfect_and_none_finds_nothing(crops):
     frames = read_frames(crops / "val")
     true = iter(frames)
-    perfect = figures_of(lambda depth, focal_px: next(true).distance, frames, "clean")
-    figures = summary(perfect, cuts(perfect))
-    assert figures["rmse_r"] == figures["q95_r"] == 0
-    assert figures["recall_1r"] == figures["recall_4r"] == 1
-    nothing = figures_of(lambda depth, focal_px: np.full(depth.shape, 16.0), frames, "clean")
+    perfect = metrics_of(lambda depth, focal_px: next(true).distance, frames, "clean")
+    metrics = summary(perfect, cuts(perfect))
+    assert metrics["rmse_r"] == metrics["q95_r"] == 0
+    assert metrics["recall_1r"] == metrics["recall_4r"] == 1
+    nothing = metrics_of(lambda depth, focal_px: np.full(depth.shape, 16.0), frames, "clean")
     assert summary(nothing, cuts(nothing))["recall_4r"] == 0
 
 
-def test_figures_count_only_pixels_with_a_label():
+def test_metrics_count_only_pixels_with_a_label():
     true = np.array([[0.5, 3.0], [16.0, 16.0]])
     found = np.array([[0.5, 5.0], [16.0, 1.0]])
     counts = np.array([[True, True], [True, False]])
-    figures = frame_figures(found, true, counts)
-    assert figures["rmse_r"] == pytest.approx(np.sqrt(4 / 3))
-    assert figures["found_4r"][64] == pytest.approx(0.5)  # cut at 4 r: of two sharp pixels one
-    assert figures["false_4r"][64] == 0
+    metrics = frame_metrics(found, true, counts)
+    assert metrics["rmse_r"] == pytest.approx(np.sqrt(4 / 3))
+    assert metrics["found_4r"][64] == pytest.approx(0.5)  # cut at 4 r: of two sharp pixels one
+    assert metrics["false_4r"][64] == 0

@@ -12,13 +12,13 @@ import pytest
 from export.bundle import read_manifest
 from export.evaluation import gallery
 from export.evaluation.backends import Prediction, fingerprint
-from export.evaluation.breakdown import GroupFigures
+from export.evaluation.breakdown import GroupMetrics
 from export.evaluation.calibration import BINS
 from export.evaluation.card import card, main
 from export.evaluation.failures import KINDS
 from export.evaluation.gallery import COLUMNS, HEADER_PX, TILE, draw_kind
-from export.evaluation.measure import Figures
-from export.evaluation.photos import PhotoFigures
+from export.evaluation.measure import Metrics
+from export.evaluation.photos import PhotoMetrics
 from export.evaluation.report import SCHEMA
 from export.evaluation.surface_accuracy import FATES
 from export.shards import ShardWriter
@@ -41,7 +41,7 @@ def document(start: float, step: float) -> dict:
 
     groups = [
         {"by": "size", "name": name, "people": next_count()}
-        | {f.name: next_fraction() for f in fields(GroupFigures) if f.name not in ("by", "name", "people")}
+        | {f.name: next_fraction() for f in fields(GroupMetrics) if f.name not in ("by", "name", "people")}
         for name in ("small", "tall")
     ]
 
@@ -59,16 +59,16 @@ def document(start: float, step: float) -> dict:
         }
         return values
 
-    figures = own(Figures) | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoFigures)}
-    figures["pixel_fates"] = {name: next_fraction() for name in FATES}
+    metrics = own(Metrics) | {"model": "somewhere", "fingerprint": DIGEST, "photos": own(PhotoMetrics)}
+    metrics["pixel_fates"] = {name: next_fraction() for name in FATES}
     for field in ("part_recall", "part_precision", "part_error_cm"):
-        figures[field] = [next_fraction() for _ in range(PART_COUNT + 1)]
+        metrics[field] = [next_fraction() for _ in range(PART_COUNT + 1)]
     return {
         "schema": SCHEMA,
         "data": {"limit": next_count(), "score_floor": next_fraction()},
         "part_names": PART_NAMES,
         "calibration_bins": BINS,
-        "results": {"int8 capi": figures},
+        "results": {"int8 capi": metrics},
     }
 
 
@@ -82,23 +82,23 @@ def written(doc: dict) -> str:
     return card(read_manifest(BUNDLE), DIGEST, doc, "failures.jpg")
 
 
-def test_the_cards_figures_are_those_of_the_json():
+def test_the_cards_metrics_are_those_of_the_json():
     doc = document(0.1, 0.001)
-    figures = doc["results"]["int8 capi"]
-    figures |= {"ap_gpsm": 0.3127, "error_cm_painted": 9.84, "mask_iou": None}
-    figures["part_recall"][3], figures["part_precision"][3], figures["part_error_cm"][3] = 0.25, 0.5, 101.26
-    figures["calibration"]["expected_error"] = 0.116
-    figures["photos"] |= {"left_right": 0.658, "false_people": 1.588}
+    metrics = doc["results"]["int8 capi"]
+    metrics |= {"ap_gpsm": 0.3127, "error_cm_painted": 9.84, "mask_iou": None}
+    metrics["part_recall"][3], metrics["part_precision"][3], metrics["part_error_cm"][3] = 0.25, 0.5, 101.26
+    metrics["calibration"]["expected_error"] = 0.116
+    metrics["photos"] |= {"left_right": 0.658, "false_people": 1.588}
     text = written(doc)
     assert row(text, "GPSm AP .50:.95") == ["31.3"]
     assert row(text, "surface error, all painted") == ["9.8 cm"]
     assert row(text, "mask IoU") == ["-"]
     assert row(text, "right hand") == ["25.0", "50.0", "101.3 cm"]
-    assert row(text, "size: small")[0] == str(figures["groups"][0]["people"])
+    assert row(text, "size: small")[0] == str(metrics["groups"][0]["people"])
     assert "Expected calibration error: 11.6 %" in text
     photos = text[text.index("real photographs") :]
     assert row(photos, "left/right") == ["65.8"]
-    assert f"({figures['photos']['empty_photos']} photos) | 1.59 |" in photos
+    assert f"({metrics['photos']['empty_photos']} photos) | 1.59 |" in photos
 
 
 def test_every_row_of_a_table_has_as_many_cells_as_its_head():
@@ -106,7 +106,7 @@ def test_every_row_of_a_table_has_as_many_cells_as_its_head():
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}) == 1, table
 
 
-def test_no_number_of_the_card_but_those_of_labels_and_manifest_stays_when_all_figures_change():
+def test_no_number_of_the_card_but_those_of_labels_and_manifest_stays_when_all_metrics_change():
     manifest = json.dumps(read_manifest(BUNDLE))
     first, second = (
         [NUMBER.findall(line) for line in written(document(*numbers)).splitlines()]
@@ -120,7 +120,7 @@ def test_no_number_of_the_card_but_those_of_labels_and_manifest_stays_when_all_f
     assert sum(a != b for x, y in zip(first, second, strict=True) for a, b in zip(x, y, strict=True)) > 100
 
 
-def test_figures_of_another_model_are_refused():
+def test_metrics_of_another_model_are_refused():
     doc = document(0.1, 0.001)
     with pytest.raises(ValueError, match="not of the model ffff"):
         card(read_manifest(BUNDLE), "ffff", doc, "failures.jpg")
@@ -186,21 +186,21 @@ def test_the_gallery_shows_image_and_paint_of_the_named_cases_and_no_private_pho
     for name in ("private.jpg", "public.jpg"):
         cv2.imwrite(str(tmp_path / name), np.full((80, 100, 3), 200, np.uint8))
     monkeypatch.setattr(gallery, "REDISTRIBUTABLE", {"public.jpg": tmp_path / "public.jpg"})
-    figures = {"failures": {"false": cases}, "photos": {"failures": {"false": [private, public]}}}
+    metrics = {"failures": {"false": cases}, "photos": {"failures": {"false": [private, public]}}}
     data = {"folder": str(tmp_path), "photos": str(tmp_path), "empty": str(tmp_path)}
-    drawn = draw_kind("false", Painter(), data, figures, count=1, all_photos=False)
+    drawn = draw_kind("false", Painter(), data, metrics, count=1, all_photos=False)
     assert drawn.shape == (HEADER_PX + TILE[1], COLUMNS * TILE[0], 3)
     tiles = drawn[HEADER_PX:].reshape(TILE[1], COLUMNS, TILE[0], 3)
     assert tiles.any((0, 2, 3)).tolist() == [True, True, False, False]  # one rendered image, one photograph
     tile = tiles[:, 0]
     assert tile[100, 120].tolist() == [128] * 3  # the image itself on the left,
     assert np.ptp(tile[100, 270].astype(int)) > 50  # in colour on the right
-    everything = draw_kind("false", Painter(), data, figures, count=3, all_photos=True)[HEADER_PX:]
+    everything = draw_kind("false", Painter(), data, metrics, count=3, all_photos=True)[HEADER_PX:]
     assert everything.reshape(TILE[1], COLUMNS, TILE[0], 3).any((0, 2, 3)).all()
 
 
 def test_a_kind_without_cases_is_a_title_alone(tmp_path):
-    figures = {"failures": {"side": []}, "photos": None}
-    drawn = draw_kind("side", Painter(), {"folder": str(tmp_path)}, figures, 3, all_photos=False)
+    metrics = {"failures": {"side": []}, "photos": None}
+    drawn = draw_kind("side", Painter(), {"folder": str(tmp_path)}, metrics, 3, all_photos=False)
     assert drawn.shape == (HEADER_PX, COLUMNS * TILE[0], 3)
     assert drawn.any()

@@ -1,4 +1,4 @@
-"""Shards in, predictions in, figures out: on small made images with a made body surface."""
+"""Shards in, predictions in, metrics out: on small made images with a made body surface."""
 
 import dataclasses
 import json
@@ -12,7 +12,7 @@ from export.evaluation import __main__ as command
 from export.evaluation import report
 from export.evaluation.backends import Prediction, fingerprint, open_backend
 from export.evaluation.json_values import plain
-from export.evaluation.measure import Figures, Tally, image_ranges, measure
+from export.evaluation.measure import Metrics, Tally, image_ranges, measure
 from export.evaluation.paint import mosaic, paint
 from export.evaluation.plot import write_image
 from export.evaluation.surface_accuracy import FATES, PixelAccuracy, SurfacePoints, mask_overlap, sample_pixels
@@ -93,18 +93,18 @@ class Fake:
         return self.edit(Prediction(item.box, score, item.label[..., :3].copy(), item.label[..., 3].copy()))
 
 
-def figures(folder, edit=lambda prediction: prediction):
-    return figures_of(list(read_images(shard_paths(folder))), edit)
+def metrics(folder, edit=lambda prediction: prediction):
+    return metrics_of(list(read_images(shard_paths(folder))), edit)
 
 
-def figures_of(images, edit):
+def metrics_of(images, edit):
     backend, tally = Fake(images, edit), Tally(Fake.threshold)
     for image in images:
         tally.add(backend, image)
-    return tally.figures(LineSurface())
+    return tally.metrics(LineSurface())
 
 
-def test_figures_of_parts_are_those_of_the_whole(folder, monkeypatch):
+def test_metrics_of_parts_are_those_of_the_whole(folder, monkeypatch):
     images = list(read_images(shard_paths(folder)))
 
     def spoil(prediction):
@@ -114,9 +114,9 @@ def test_figures_of_parts_are_those_of_the_whole(folder, monkeypatch):
     monkeypatch.setattr("export.evaluation.measure.IMAGES_A_JOB", 1)
     ranges = image_ranges("fake", 0.05, shard_paths(folder))
     assert [(r.first, r.count) for r in ranges] == [(0, 1), (1, 1)]
-    parts, whole = measure(ranges, LineSurface(), Workers(0)), figures(folder, spoil)
+    parts, whole = measure(ranges, LineSurface(), Workers(0)), metrics(folder, spoil)
     assert whole.recall_shown < 1
-    for field in dataclasses.fields(Figures):
+    for field in dataclasses.fields(Metrics):
         if field.name != "seconds_per_image":
             left, right = (json.dumps(plain(getattr(f, field.name))) for f in (parts, whole))
             assert left == right, field.name
@@ -157,7 +157,7 @@ def test_sampled_pixels_are_the_same_every_time_and_at_most_196(folder):
 
 
 def test_the_truth_itself_gets_full_marks(folder):
-    result = figures(folder)
+    result = metrics(folder)
     assert (result.images, result.people, result.ignored) == (2, 3, 1)
     assert (result.ap_box, result.part_accuracy, result.mask_iou) == (1, 1, 1)
     assert (result.ap_gps, result.ap_gpsm) == (1, 1)
@@ -172,7 +172,7 @@ def test_pixels_of_a_missed_person_count_as_wrong(folder):
         iuv = prediction.iuv * shown[..., None]
         return Prediction(prediction.box[:1], prediction.score[:1], iuv, prediction.inds * shown)
 
-    result = figures(folder, forget_second)
+    result = metrics(folder, forget_second)
     first, second = 20 * 30, 25 * 20
     assert result.part_accuracy == pytest.approx(first / (first + second))
     assert result.mask_iou == pytest.approx(first / (first + second))
@@ -183,7 +183,7 @@ def test_people_below_the_score_threshold_enter_ap_but_not_the_image(folder):
     def doubt(prediction):
         return Prediction(prediction.box, prediction.score - 0.6, prediction.iuv, prediction.inds)
 
-    result = figures(folder, doubt)
+    result = metrics(folder, doubt)
     assert (result.ap_box, result.ap_gps) == (1, 1)
     assert (result.found, result.part_accuracy, result.mask_iou) == (0, 0, 0)
     assert np.isnan(result.error_cm_painted)
@@ -198,7 +198,7 @@ def test_thirty_centimetres_along_the_surface_halve_gps(folder):
         iuv[..., 1] = np.where(iuv[..., 0] > 0, np.round((along * 4 - (iuv[..., 0] - 1.0)) * 255), 0)
         return Prediction(prediction.box, prediction.score, iuv, prediction.inds)
 
-    result = figures(folder, shift)
+    result = metrics(folder, shift)
     assert result.error_cm_painted == pytest.approx(30, abs=0.5)
     assert result.ap_gps_by_threshold[0] in (0, 1)  # exp(-.3^2 / (2 * .255^2)) = 0.5006
     assert result.ap_gps_by_threshold[1] == 0
@@ -211,10 +211,10 @@ def test_a_person_painted_by_another_detection_is_not_that_detections_merit(fold
         return Prediction(prediction.box, prediction.score, prediction.iuv, inds)
 
     images = list(read_images(shard_paths(folder)))
-    result = figures_of(images[:1], swap)
+    result = metrics_of(images[:1], swap)
     assert (result.ap_box, result.part_accuracy) == (1, 1)
     assert result.ap_gps == 1  # each person is still painted right by one detection
-    one = figures_of(images[:1], lambda p: swap(p).above(0.85))
+    one = metrics_of(images[:1], lambda p: swap(p).above(0.85))
     assert one.ap_gps_50 == pytest.approx(51 / 101)
 
 
@@ -230,7 +230,7 @@ def test_pixels_painted_beside_the_person_lower_gpsm_but_not_gps(folder):
         return Prediction(only.box, only.score, iuv, inds)
 
     images = list(read_images(shard_paths(folder)))[1:]  # its second person is ignored
-    result = figures_of(images, spill)
+    result = metrics_of(images, spill)
     assert result.ap_gps == 1
     assert result.ap_gpsm_by_threshold == [1, 1, 1] + [0] * 7  # sqrt(.4) = .632
 
@@ -252,7 +252,7 @@ def test_the_surface_error_of_a_part_is_that_of_its_own_painted_points():
 
 def test_an_answer_of_the_wrong_size_is_refused(folder):
     with pytest.raises(ValueError, match="planes"):
-        figures(folder, lambda p: Prediction(p.box, p.score, p.iuv[1:], p.inds[1:]))
+        metrics(folder, lambda p: Prediction(p.box, p.score, p.iuv[1:], p.inds[1:]))
 
 
 def test_median_difference_is_over_right_parts_only():
@@ -282,7 +282,7 @@ def test_pixels_painted_wrong_are_told_apart_by_how():
 
 
 def test_table_and_files_show_differences_and_hold_no_nan(folder, tmp_path):
-    results = {"fp32 torch": figures(folder), "int8 capi": figures(folder, lambda p: p.above(0.85))}
+    results = {"fp32 torch": metrics(folder), "int8 capi": metrics(folder, lambda p: p.above(0.85))}
     console = Console(width=140, record=True)
     report.print_table(results, console)
     text = console.export_text()
@@ -318,8 +318,8 @@ def test_one_command_measures_rendered_images_and_labelled_photographs(folder, t
     arguments += ["--out", str(tmp_path / "out"), "--backends", "fake"]
     assert command.main(arguments) == 0
     document = json.loads((tmp_path / "out/evaluation.json").read_text())
-    figures = report.column_of(document, fingerprint(backend.path))
-    assert (figures["images"], figures["photos"]["photos"]) == (2, 1)
+    metrics = report.column_of(document, fingerprint(backend.path))
+    assert (metrics["images"], metrics["photos"]["photos"]) == (2, 1)
     assert (tmp_path / "out/evaluation.png").exists()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from export.heads.encoder import CELL_PX, CELLS, OUTPUTS, at_pixels, photo_figures, photo_losses  # noqa: E402
+from export.heads.encoder import CELL_PX, CELLS, OUTPUTS, at_pixels, photo_losses, photo_metrics  # noqa: E402
 from export.heads.photos.faces import HEAD, NOTHING, UNKNOWN, PhotoFaces  # noqa: E402
 from export.heads.photos.judge import batched_photos, crop_photo  # noqa: E402
 
@@ -57,17 +57,17 @@ def right(matte_logit: float = 8.0) -> tuple[torch.Tensor, tuple[torch.Tensor, .
     return cells, batch[1:]
 
 
-def test_losses_and_figures_count_known_points_and_cells_alone():
+def test_losses_and_metrics_count_known_points_and_cells_alone():
     cells, labels = right()
     terms = photo_losses(cells, *labels)
     assert set(terms) == {"point", "coarse", "matte"}
     assert terms["coarse"] == pytest.approx(0, abs=1e-6)
     assert terms["matte"] < 0.01
-    found = photo_figures(cells, *labels)
+    found = photo_metrics(cells, *labels)
     assert found["photo_mm"] == pytest.approx(0, abs=1e-4)
     assert found["photo_matte_iou"] == 1
     cells[..., 0] += 0.1
-    assert photo_figures(cells, *labels)["photo_mm"] == pytest.approx(10, abs=1e-3)
+    assert photo_metrics(cells, *labels)["photo_mm"] == pytest.approx(10, abs=1e-3)
     assert photo_losses(cells, *labels)["coarse"] == pytest.approx(0.1, abs=1e-5)
     cells[labels[3] < 0] = 1e4  # cells of which nothing is known
     assert photo_losses(cells, *labels)["matte"] < 0.01

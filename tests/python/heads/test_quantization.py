@@ -26,7 +26,7 @@ from export.heads.prior_file import read_prior, write_prior
 from export.heads.train_prior import HeadTensors
 from quantization import heads
 from quantization.analysis.errors import float_nodes_left
-from quantization.heads import bases_cost, figures_of, float_prior, parts_sqnr, spread
+from quantization.heads import bases_cost, float_prior, metrics_of, parts_sqnr, spread
 from quantization.settings import HEADS, HeadSettings, read_settings
 
 pytestmark = pytest.mark.usefixtures("one_thread", "fixed_seed")
@@ -203,7 +203,7 @@ def test_the_noise_of_template_points_is_told_apart_from_that_of_logits():
     assert found["matte"] == found["normal"] == found["log_sigma"] == float("inf")
 
 
-def test_figures_are_in_millimetres_and_degrees():
+def test_metrics_are_in_millimetres_and_degrees():
     template = np.random.default_rng(0).normal(size=(48, 48, 3)).astype(np.float32)
     normal = np.broadcast_to(np.float32([0, 0, -1]), (48, 48, 3))
     crop = Crop(np.zeros((192, 192, 3), np.uint8), template, np.ones((48, 48), np.float32), normal)
@@ -211,7 +211,7 @@ def test_figures_are_in_millimetres_and_degrees():
     cells[..., :3] = torch.from_numpy(template) + torch.tensor([0.03, 0.0, 0.04])
     cells[..., 4] = 1.0
     cells[..., 5:] = torch.tensor([0.0, 1.0, -1.0])
-    found = figures_of(cells, [crop])
+    found = metrics_of(cells, [crop])
     assert (found["median_mm"], found["point_mm"], found["matte_iou"]) == (5.0, 5.0, 1.0)
     assert found["normal_deg"] == pytest.approx(45, abs=0.01)
 

@@ -121,7 +121,7 @@ def test_differences_of_u_and_v_are_taken_where_the_part_is_the_same():
 
 def test_equal_results_pass_and_nobody_is_no_pass():
     assert compare([prediction([0, 1, 2])], [prediction([0, 1, 2])]).passed
-    nobody: Agreement = Tally().figures()
+    nobody: Agreement = Tally().metrics()
     assert np.isnan(nobody.labels)
     assert not nobody.passed
 

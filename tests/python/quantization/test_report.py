@@ -139,7 +139,7 @@ def rebuilt(tmp_path_factory):
 def complaints(rebuilt, bundle, graphs=GRAPHS):
     """A report of some graphs: a broken tensor changes no other graph's numbers."""
     expected = json.loads(report.JSON.read_text())["check"]
-    expected = {name: figures for name, figures in expected.items() if name.split(":")[0] in graphs}
+    expected = {name: metrics for name, metrics in expected.items() if name.split(":")[0] in graphs}
     reference = {name: rebuilt[0][name] for name in graphs}
     return check.complaints(expected, check.own_errors(reference, bundle, rebuilt[1]))
 

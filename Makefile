@@ -100,6 +100,7 @@ format: packages-lint  ## rewrite C++ (clang-format) and Python (ruff) sources i
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format -i
 	@.venv/bin/ruff format . && .venv/bin/ruff check --fix .
 
+# clang-tidy checks 16 files as one, because it reads their headers once then.
 .PHONY: lint
 lint: packages-lint packages-test  ## check layout and lint rules without changing anything
 	@git ls-files -co --exclude-standard '*.h' '*.hpp' '*.c' '*.cpp' | xargs -r clang-format --dry-run --Werror

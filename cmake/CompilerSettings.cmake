@@ -21,7 +21,7 @@ target_compile_options(maq_compiler_settings INTERFACE -fstack-protector-strong)
 target_link_options(maq_compiler_settings INTERFACE -Wl,-z,relro -Wl,-z,now -Wl,-z,noexecstack)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 check_pie_supported(LANGUAGES C CXX)
-# Where a jump or a return may lead: x86-64 CET, aarch64 BTI and PAC. Clang warns about those of another processor.
+# Where a jump or a return may lead: x86-64 CET, aarch64 BTI and PAC. Clang warns about a flag of another processor.
 set(CMAKE_REQUIRED_FLAGS -Werror)
 foreach(_flag -fcf-protection=full -mbranch-protection=standard)
   string(MAKE_C_IDENTIFIER "MAQ_HAVE${_flag}" _have)

@@ -32,7 +32,7 @@ from tqdm import tqdm
 from export.bundle import bytes_of, read_manifest
 from export.densepose.graphs import session
 from export.heads.bundle import PRIOR, TEMPLATE, write_manifest
-from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, metrics
+from export.heads.encoder import LOG_SIGMA, MATTE, NORMAL, POINT, cell_metrics
 from export.heads.encoder_data import (
     Backgrounds,
     Crop,
@@ -56,7 +56,7 @@ from quantization.samples import Sample
 from quantization.settings import HEADS, GraphSettings, HeadSettings, read_settings
 
 PARTS = {"template_point": POINT, "log_sigma": LOG_SIGMA, "matte": MATTE, "normal": NORMAL}
-# Metrics of `metrics` that are shown, in this order, with digits: template points in mm, matte, degrees.
+# Metrics of `cell_metrics` that are shown, in this order, with digits: template points in mm, matte, degrees.
 FIGURES = {"median_mm": 3, "point_mm": 3, "within_2_sigma": 4, "matte_iou": 4, "normal_deg": 2}
 
 
@@ -90,7 +90,7 @@ def cells_of(encoder: Path, given: Sequence[Sample]) -> Tensor:
 
 def metrics_of(cells: Tensor, crops: Sequence[Crop]) -> dict[str, float]:
     """FIGURES on crops whose truth is known."""
-    found = metrics(cells, *batched(list(crops))[1:])
+    found = cell_metrics(cells, *batched(list(crops))[1:])
     return {name: round(found[name], digits) for name, digits in FIGURES.items()}
 
 

@@ -191,7 +191,7 @@ def _calibration(bins: int, calibration: dict) -> str:
 
 
 def _photo_metrics(photos: dict | None) -> str:
-    title = "## Figures on real photographs\n\n"
+    title = "## Metrics on real photographs\n\n"
     if photos is None:
         return title + "Not measured.\n"
     text = f"""\

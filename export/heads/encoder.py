@@ -112,7 +112,7 @@ SCALES = {"point": 0.3, "coarse": 1.0, "matte": 1.0, "normal": 0.3}
 
 
 @torch.no_grad()
-def metrics(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, float]:
+def cell_metrics(cells: Tensor, template: Tensor, matte: Tensor, normal: Tensor) -> dict[str, float]:
     """Mean and median error of template points (mm), those within two of their sigmas, IoU of mattes, degrees."""
     on = matte > 0.6
     away = (cells[..., POINT] - template).norm(dim=-1)[on] * 100

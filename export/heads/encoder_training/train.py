@@ -27,8 +27,8 @@ from export.heads.encoder import (
     POINT,
     SCALES,
     HeadEncoder,
+    cell_metrics,
     losses,
-    metrics,
     photo_losses,
     photo_metrics,
     start_from_detector,
@@ -186,7 +186,7 @@ def train(options: argparse.Namespace) -> None:
             skipped += 1
         step += 1
         if step in (1, 20) or step % 100 == 0:
-            found = metrics(cells[: len(made[0])].detach(), *made[1:])
+            found = cell_metrics(cells[: len(made[0])].detach(), *made[1:])
             if real is not None:
                 found |= photo_metrics(cells[len(made[0]) :].detach(), *real[1:])
             now = synchronized_s(device)

@@ -127,7 +127,8 @@ def main() -> int:
         for name in names
         for line, kind, text in faults(name, Path(name).read_text())
     ]
-    print("\n".join(found))
+    for fault in found:
+        print(fault)
     return 1 if found else 0
 
 

@@ -60,7 +60,7 @@ class Pipeline internal constructor(private val context: Handle, bundle: ModelBu
             }
     }
 
-    /** The activity of a pipeline. */
+    /** The state of a pipeline. */
     enum class State(internal val code: Int) {
         /** It has no source: none was set yet, or [stop] was called. */
         STOPPED(MAQ_PIPELINE_STOPPED),

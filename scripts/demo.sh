@@ -23,8 +23,8 @@ for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
 done
 
 # A head of the person in the photo with the photo as its texture, and a clip of it turning.
-printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --texture 1024 --preview %s/head_turning.mp4\n' "$out" "$out"
-"$maquette" head tests/media/photo.jpg --out "$out/head.glb" --texture 1024 --preview "$out/head_turning.mp4"
+printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"
+"$maquette" head tests/media/photo.jpg --out "$out/head.glb" --preview "$out/head_turning.mp4"
 
 # Predicts the next frames of the clip, next to the real ones, and scores the novelty of each frame.
 printf '\n== maquette predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out %s/next.mp4\n' "$out"

@@ -52,7 +52,7 @@ def measure_settings(
     """Returns one row for each setting and head that was found."""
     rows = []
     for setting in tqdm(settings_of(at_s), desc="settings", unit="setting", disable=None):
-        with HeadBuilder(bundle, **{"threads": threads, **setting.builder}) as builder:
+        with HeadBuilder(bundle, False, **{"threads": threads, **setting.builder}) as builder:
             for head, photo in heads:
                 try:
                     rows.append({"setting": setting.name, "head": head.name} | _one(builder, head, photo, setting))

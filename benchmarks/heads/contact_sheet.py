@@ -152,7 +152,7 @@ def draw(measured: Mapping, bundle: Path, sources: Sources, out: Path, threads: 
     cases = rendered_cases(measured, sources.data, PhotoBackgrounds(sources.backgrounds), at_s)
     cases += photo_cases(sources.photos, sources.data / "photos/test", sources.count)
     if cases:
-        with HeadBuilder(bundle, threads=threads) as builder:
+        with HeadBuilder(bundle, texture=False, threads=threads) as builder:
             rows = [row_of(builder, case, at_s) for case in tqdm(cases, desc="sheet", unit="head", disable=None)]
         out.parent.mkdir(parents=True, exist_ok=True)
         cv2.imwrite(str(out), mosaic([tile for row in rows for tile in row], len(COLUMNS))[..., ::-1])

@@ -289,8 +289,8 @@ def run(options: argparse.Namespace) -> dict:
     for number, bundle in enumerate(options.bundles):
         mean, others = read_mean_head(bundle), baselines_of(options, bundle, maker) if not number else NOTHING_ELSE
         with (
-            HeadBuilder(bundle, threads=options.threads) as builder,
-            HeadBuilder(bundle, texture=True, threads=options.threads, texture_px=TEXTURE_PX) as of_textures,
+            HeadBuilder(bundle, texture=False, threads=options.threads) as builder,
+            HeadBuilder(bundle, threads=options.threads, texture_px=TEXTURE_PX) as of_textures,
         ):
             painter = Painter(of_textures, options.at) if not number else None
             for own in sets:

@@ -148,7 +148,7 @@ def measure_real(
     if not found:
         return rows
     mean = MeanHeads(bundle)
-    with HeadBuilder(bundle, threads=threads) as builder:
+    with HeadBuilder(bundle, texture=False, threads=threads) as builder:
         for face in tqdm(found, desc="real photographs", unit="face", disable=None):
             about = {"face": face.name, "split": face.split, "eyes_px": face.eyes_px}
             try:

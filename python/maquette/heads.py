@@ -260,8 +260,8 @@ class HeadBuilder(NativeObject):
         head = builder.fit(seconds=3)
         head.mesh().save("head.glb")
 
-    bundle: a folder with manifest.json (default: the one in the package). texture: whether heads get a texture; None:
-    the SDK's choice, which is no texture in this version. settings: fields of maq_head_builder_config by their names:
+    bundle: a folder with manifest.json (default: the one in the package). texture: whether heads get a texture with
+    the photos' pixels; None: the SDK's choice, which is a texture in this version. settings: fields of maq_head_builder_config by their names:
     threads, provider, texture_px (256 to 2048; default 1024), mirror_unseen, delight_texture, ... The part of each
     photo around the head stays in memory until `clear` or `close`. Raises MaquetteError.
     """

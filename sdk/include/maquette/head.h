@@ -34,7 +34,7 @@ typedef struct maq_head_renderer maq_head_renderer;
 
 /* Whether heads get a texture. Values never change meaning; new ones are added at the end. */
 typedef enum maq_head_texture {
-  MAQ_HEAD_TEXTURE_DEFAULT = 0, /* the SDK's choice: MAQ_HEAD_TEXTURE_OFF in this version */
+  MAQ_HEAD_TEXTURE_DEFAULT = 0, /* the SDK's choice: MAQ_HEAD_TEXTURE_ON in this version */
   MAQ_HEAD_TEXTURE_OFF = 1,     /* heads have only the network's colours, and hold no part of a photo */
   MAQ_HEAD_TEXTURE_ON = 2 /* the photos' pixels where a photo shows the surface well, the network's colours elsewhere */
 } maq_head_texture;
@@ -45,7 +45,7 @@ typedef struct maq_head_builder_config {
   maq_model_options model;  /* the encoder network; model.threads also counts for the fit. The bundle has the task
                                "heads"; the installed one is share/maquette/models/heads-int8. */
   maq_head_texture texture; /* a texture of 1024 pixels a side takes 140 MB of memory and one to two seconds more */
-  uint32_t texture_px;      /* pixels a side of the texture, 256 to 2048; 0: 1024. Only with MAQ_HEAD_TEXTURE_ON. */
+  uint32_t texture_px;      /* pixels a side of the texture, 256 to 2048; 0: 1024. Not with MAQ_HEAD_TEXTURE_OFF. */
   int32_t mirror_unseen;    /* 1: if no photo sees one side of the head, the texture of the other side is mirrored.
                                0: that side has the network's colours. */
   int32_t delight_texture;  /* 1: directional light of the photos is removed from the texture, as far as it can be
@@ -124,8 +124,8 @@ MAQ_API maq_status maq_head_builder_add_photo(maq_head_builder* builder, const m
 
 /* Uses `head` as prior for later fits, which do not need its photos again. `head` must show the same person and come
  * from the same bundle. A builder has one prior head: another call replaces it. In a head that is fitted afterwards,
- * the cameras of `head` come first, unchanged. A known size stays. Colours depend more on this builder's photos. If the
- * config asks for a texture, the texture of `head` fills the parts that these photos do not show. `head` is not kept.
+ * the cameras of `head` come first, unchanged. A known size stays. Colours depend more on this builder's photos. Unless the
+ * config has MAQ_HEAD_TEXTURE_OFF, the texture of `head` fills the parts that these photos do not show. `head` is not kept.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (it has more than 192 photos), MAQ_ERROR_UNSUPPORTED (another
  * bundle, or a file of version 1). Blocks for some milliseconds. */
 MAQ_API maq_status maq_head_builder_add_head(maq_head_builder* builder, const maq_head* head);

@@ -24,6 +24,12 @@ class ApiHeadRendering : public testing::Test {
     head = builder.fit(0);
   }
 
+  static maq_head_builder_config without_texture() {
+    maq_head_builder_config config = maquette::default_head_builder_config();
+    config.model.bundle_path = kRoundHeads;
+    config.texture = MAQ_HEAD_TEXTURE_OFF;
+    return config;
+  }
   static maq_head_photo known() {
     maq_head_photo hints = maquette::default_head_photo();
     const float box[4] = {110, 60, 200, 180};
@@ -62,7 +68,7 @@ class ApiHeadRendering : public testing::Test {
 
   std::vector<uint8_t> pixels = std::vector<uint8_t>(320 * 240 * 3);
   const maquette::Context context;
-  maquette::HeadBuilder builder{context, kRoundHeads};
+  maquette::HeadBuilder builder{context, without_texture()};
   maquette::Head head{nullptr};
 };
 
@@ -97,7 +103,6 @@ TEST_F(ApiHeadRendering, ATextureIsShownInPlaceOfTheNetworksColours) {
   desc.planes[0] = striped.data();
   maq_head_builder_config config = maquette::default_head_builder_config();
   config.model.bundle_path = kRoundHeads;
-  config.texture = MAQ_HEAD_TEXTURE_ON;
   config.texture_px = 512;
   maquette::HeadBuilder textured(context, config);
   textured.add_photo(maquette::Frame(context, desc), known());

@@ -341,7 +341,7 @@ TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
   EXPECT_EQ(none, nullptr);
 }
 
-TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
+TEST_F(ApiHeads, AHeadHasATextureUnlessItIsSwitchedOff) {
   const TempFolder folder;
   maquette::Head plain = fitted();
   EXPECT_EQ(plain.info().texture_px, 0u);
@@ -349,7 +349,6 @@ TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
   EXPECT_EQ(Mesh(plain, coarse).texture_coordinates, nullptr);
   maq_head_builder_config config = maquette::default_head_builder_config();
   config.model.bundle_path = kHeadsBundle;
-  config.texture = MAQ_HEAD_TEXTURE_ON;
   config.texture_px = 256;
   maquette::HeadBuilder textured(context, config);
   textured.add_photo(frame, known);
@@ -397,7 +396,7 @@ TEST_F(ApiHeads, AHeadHasATextureWhereItIsAskedFor) {
   config.texture = MAQ_HEAD_TEXTURE_OFF;
   config.texture_px = 256;
   EXPECT_EQ(maq_head_builder_create(context.get(), &config, &none), MAQ_ERROR_INVALID_ARGUMENT);
-  expect_text("config.texture is not MAQ_HEAD_TEXTURE_ON");
+  expect_text("config.texture is MAQ_HEAD_TEXTURE_OFF");
 }
 
 TEST_F(ApiHeads, MeshesAreWrittenByTheirEnding) {

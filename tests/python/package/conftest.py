@@ -7,13 +7,13 @@ from round_heads import BOX, COARSE_M, GREY, ROUND
 
 @pytest.fixture
 def builder():
-    with maquette.HeadBuilder(ROUND, threads=1) as made:
+    with maquette.HeadBuilder(ROUND, texture=False, threads=1) as made:
         yield made
 
 
 @pytest.fixture(scope="session")
 def head() -> maquette.Head:
-    with maquette.HeadBuilder(ROUND, threads=1) as made:
+    with maquette.HeadBuilder(ROUND, texture=False, threads=1) as made:
         made.add_photo(GREY, BOX)
         return made.fit(0)
 

@@ -302,7 +302,7 @@ def test_files_for_other_programs_have_the_triangles_asked_for(head, tmp_path, e
 
 
 def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
-    with maquette.HeadBuilder(ROUND, texture=True, threads=1, texture_px=256, mirror_unseen=1) as builder:
+    with maquette.HeadBuilder(ROUND, threads=1, texture_px=256, mirror_unseen=1) as builder:
         builder.add_photo(GREY, BOX)
         head = builder.fit(0)
     mesh = head.mesh(cell_m=COARSE_M)
@@ -326,7 +326,7 @@ def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
         (lambda b, h, r: maquette.HeadBuilder("nowhere"), maquette.MaquetteError, "nowhere.*MAQ_ERROR_NOT_FOUND"),
         (lambda b, h, r: maquette.HeadBuilder(thread=1), TypeError, "no field thread; it has .*texture_px"),
         (lambda b, h, r: maquette.HeadBuilder(ROUND, True, texture_px=100), maquette.MaquetteError, "texture_px"),
-        (lambda b, h, r: maquette.HeadBuilder(ROUND, texture_px=512), maquette.MaquetteError, "MAQ_HEAD_TEXTURE_ON"),
+        (lambda b, h, r: maquette.HeadBuilder(ROUND, False, texture_px=512), maquette.MaquetteError, "MAQ_HEAD_TEXTURE_OFF"),
         (lambda b, h, r: b.add_photo(GREY, (5, 5, 5, 9)), maquette.MaquetteError, "box .* empty"),
         (lambda b, h, r: b.add_photo(GREY, (np.nan, 5, 50, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),
         (lambda b, h, r: b.add_photo(GREY, (400, 5, 500, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),

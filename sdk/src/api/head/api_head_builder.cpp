@@ -39,12 +39,11 @@ head::TextureOptions texture_options(const maq_head_builder_config& config) {
                   uint32_t(head::kMaxTexture_px));
     options.side_px = int(config.texture_px);
   }
-  if (config.texture == MAQ_HEAD_TEXTURE_ON) return options;
+  if (config.texture != MAQ_HEAD_TEXTURE_OFF) return options;
   if (config.texture_px != 0 || options.mirror_unseen || options.delight) {
     throw ArgumentError(
-        "config.texture_px, mirror_unseen or delight_texture is set, but config.texture is not MAQ_HEAD_TEXTURE_ON; "
-        "set "
-        "it, or leave them 0.");
+        "config.texture_px, mirror_unseen or delight_texture is set, but config.texture is MAQ_HEAD_TEXTURE_OFF; leave "
+        "them 0, or allow a texture.");
   }
   options.side_px = 0;
   return options;

@@ -41,8 +41,8 @@ struct HeadOptions {
   double pupils_mm = 0;
   std::string depth;  // a source, or "photo": the depth that came with the photo
   double cell_mm = 0;
-  uint32_t texture_px = 0;
-  bool mirror_unseen = false, delight = false;
+  uint32_t texture_px = 1024;
+  bool no_texture = false, mirror_unseen = false, delight = false;
   std::string triangles;  // empty: the library's default
   std::string topology = "field";
   std::string densepose;
@@ -389,8 +389,8 @@ maq_head_builder_config builder_config(const HeadOptions& options, const std::st
   config.model.threads = options.network.threads;
   config.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
   config.model.provider = provider_of(options.network);
-  if (options.texture_px > 0) config.texture = MAQ_HEAD_TEXTURE_ON;
-  config.texture_px = options.texture_px;
+  config.texture = options.no_texture ? MAQ_HEAD_TEXTURE_OFF : MAQ_HEAD_TEXTURE_ON;
+  config.texture_px = options.no_texture ? 0 : options.texture_px;
   config.mirror_unseen = options.mirror_unseen ? 1 : 0;
   config.delight_texture = options.delight ? 1 : 0;
   config.progress_callback = FitProgress::show;
@@ -521,19 +521,22 @@ void add_mesh_options(CLI::App& command, HeadOptions& options) {
               "Distance between vertices of the full mesh, mm (default 2.1, or 1.6 for more than 60000 triangles)")
           ->check(CLI::Range(0.5, 20.0));
   add_topology_option(command, options.topology)->excludes(triangles)->excludes(cell);
-  CLI::Option* const texture =
-      command
-          .add_option("--texture", options.texture_px,
-                      "Give the head a texture with the photos' pixels; N pixels a side, 256 to 2048, such as 1024")
-          ->check(CLI::Range(256u, 2048u));
+  CLI::Option* const no_texture =
+      command.add_flag("--no-texture", options.no_texture,
+                       "Give the head only the network's colours, blurred eyes included: no part of a photo is in it");
+  command
+      .add_option("--texture", options.texture_px,
+                  "Pixels a side of the texture, which shows the photos' pixels, 256 to 2048 (default 1024)")
+      ->check(CLI::Range(256u, 2048u))
+      ->excludes(no_texture);
   command
       .add_flag("--mirror-unseen", options.mirror_unseen,
                 "If no photo sees one side of the head, mirror the texture of the other side")
-      ->needs(texture);
+      ->excludes(no_texture);
   command
       .add_flag("--delight", options.delight,
                 "Remove directional light of the photos from the texture, for programs that relight it")
-      ->needs(texture);
+      ->excludes(no_texture);
 }
 
 constexpr char kHeadFooter[] =
@@ -541,8 +544,8 @@ constexpr char kHeadFooter[] =
     "does not tell the size of a head: it is an average size, unless --pupils or --depth gives the size.\n"
     "Parts that no photo shows, such as the back of the head, follow from similar heads. More photos of the same\n"
     "person, from the sides, help; each may have another camera. Faces should be 64 pixels or more across.\n\n"
-    "A face is biometric data: ask the person. Nothing leaves this machine. A saved head holds no photo, unless\n"
-    "--texture adds the pixels of the face.\n\n"
+    "A face is biometric data: ask the person. Nothing leaves this machine. A saved head holds pixels of\n"
+    "the face; with --no-texture it holds no part of a photo.\n\n"
     "Examples:\n"
     "  maquette head photo.jpg --out head.glb\n"
     "  maquette head front.jpg left.jpg right.jpg --out head.glb --seconds 10 --save head.maqh\n"
@@ -551,7 +554,7 @@ constexpr char kHeadFooter[] =
     "  maquette head group.jpg --out heads/head.ply --person all\n"
     "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
     "  maquette head photo.jpg --out head.glb --pupils 63\n"
-    "  maquette head photo.jpg --out head.glb --texture 1024\n"
+    "  maquette head photo.jpg --out head.glb --no-texture\n"
     "  maquette head photo.jpg --out avatar.glb --topology template\n"
     "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
     "  maquette head render head.maqh --out view.png --yaw 30\n"

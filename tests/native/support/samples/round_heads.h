@@ -50,9 +50,11 @@ struct ProgressCalls {
   }
 };
 
+// Without a texture, which would be most of the time.
 inline maq_head_builder_config builder_config(ProgressCalls* progress) {
   maq_head_builder_config config = maquette::default_head_builder_config();
   config.model.bundle_path = kHeadsBundle;
+  config.texture = MAQ_HEAD_TEXTURE_OFF;
   config.progress_callback = ProgressCalls::call;
   config.progress_user_data = progress;
   return config;

@@ -29,7 +29,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
 
     /** Whether heads get a texture. */
     enum class Texture(internal val code: Int) {
-        /** The SDK's choice: [OFF] in this version. */
+        /** The SDK's choice: [ON] in this version. */
         DEFAULT(MAQ_HEAD_TEXTURE_DEFAULT),
 
         /** Heads have colours of the network alone, and hold no part of a photo. */
@@ -44,7 +44,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      * @property allowSpinning as of [DensePose.Config].
      * @property provider as of [DensePose.Config].
      * @property texture with 1024 pixels a fit takes 140 MB of memory more.
-     * @property texturePx pixels a side, 256 to 2048; 0: 1024. Only with [Texture.ON].
+     * @property texturePx pixels a side, 256 to 2048; 0: 1024. Not with [Texture.OFF].
      * @property mirrorUnseen if no photo sees one side of the head, the texture of the other side is mirrored.
      * @property delightTexture directional light of the photos is removed from the texture, as far as the colours tell it,
      *   so that an app can relight the head.

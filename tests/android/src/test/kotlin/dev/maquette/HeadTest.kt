@@ -27,13 +27,15 @@ class HeadTest : AndroidTest() {
         return maquette.frame(PixelFormat.BGR8, 320, 240, Plane(pixels))
     }
 
-    private fun <T> withBuilder(config: HeadBuilder.Config = HeadBuilder.Config(), work: (HeadBuilder) -> T): T =
+    private val plain = HeadBuilder.Config(texture = HeadBuilder.Texture.OFF)
+
+    private fun <T> withBuilder(config: HeadBuilder.Config = plain, work: (HeadBuilder) -> T): T =
         maquette.headBuilder(bundle, config).use { builder ->
             photo().use { builder.addPhoto(it, box) }
             work(builder)
         }
 
-    private fun head(config: HeadBuilder.Config = HeadBuilder.Config()): Head = withBuilder(config) { it.fit(0.0) }
+    private fun head(config: HeadBuilder.Config = plain): Head = withBuilder(config) { it.fit(0.0) }
 
     private fun FloatBuffer.points() =
         List(capacity() / 3) { k ->
@@ -196,8 +198,8 @@ class HeadTest : AndroidTest() {
     }
 
     @Test
-    fun aTextureIsMadeWhereItIsAskedFor() {
-        head(HeadBuilder.Config(texture = HeadBuilder.Texture.ON, texturePx = 256, mirrorUnseen = true)).use { head ->
+    fun aTextureIsMadeUnlessItIsSwitchedOff() {
+        head(HeadBuilder.Config(texturePx = 256, mirrorUnseen = true)).use { head ->
             assertEquals(256, head.info.texturePx)
             val mesh = head.mesh(coarse)
             maquette.decode(mesh.textureJpeg!!).use { assertEquals(256 to 256, it.widthPx to it.heightPx) }
@@ -205,11 +207,11 @@ class HeadTest : AndroidTest() {
             assertEquals(2 * mesh.vertexCount, coordinates.remaining())
             assertTrue((0 until coordinates.limit()).all { coordinates[it] in 0f..1f })
         }
-        val on = HeadBuilder.Config(texture = HeadBuilder.Texture.ON)
+        val on = HeadBuilder.Config()
         val small = on.copy(texturePx = 255)
         assertTrue("255" in failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, small) })
         failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, on.copy(texturePx = -1)) }
-        failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, HeadBuilder.Config(texturePx = 512)) }
+        failure(Status.INVALID_ARGUMENT) { maquette.headBuilder(bundle, HeadBuilder.Config(texture = HeadBuilder.Texture.OFF, texturePx = 512)) }
     }
 
     @Test

@@ -26,7 +26,7 @@ open class HeadActivity : PictureScreen() {
     // The worker alone uses these. The networks are loaded when there is a photo.
     private val densePose = lazy { maquette.densePose(networks("densepose-b-int8")) }
     private val builder = lazy {
-        maquette.headBuilder(networks("heads-int8"), HeadBuilder.Config(texture = HeadBuilder.Texture.ON, texturePx = TEXTURE_PX))
+        maquette.headBuilder(networks("heads-int8"), HeadBuilder.Config(texturePx = TEXTURE_PX))
     }
     private var view: View? = null
 

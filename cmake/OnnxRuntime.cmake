@@ -3,7 +3,7 @@
 # Sets MAQ_ONNXRUNTIME_LIBRARY (a file), MAQ_ONNXRUNTIME_SONAME and the interface target maq_onnxruntime_headers, from
 #   MAQ_ONNXRUNTIME_DIR, when that is given: an unpacked release;
 #   else, with MAQ_FETCH_ONNXRUNTIME, the release below, fetched once into MAQ_DEPS_DIR by the ordinary package clients
-#     and checked against its SHA-256; 1.26.0 is the last one whose binaries send no telemetry;
+#     and checked against its SHA-256; binaries for Linux from 1.29.0 on send telemetry, 1.26 to 1.28 do not;
 #   else the target onnxruntime::onnxruntime of the app that this build is a part of, or of a package (onnxruntimeConfig),
 #     or the header and the library where the system keeps such files.
 set(MAQ_ONNXRUNTIME_VERSION 1.26.0)

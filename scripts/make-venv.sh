@@ -5,7 +5,7 @@
 #   scripts/make-venv.sh dev        + pytest and ruff
 #   scripts/make-venv.sh train,dev  + torch and moderngl (about 6 GB on disk); `teachers`: + LiteRT, `captures`: + COLMAP,
 #                                   `cluster`: + Dask, `solids`: + OpenCascade and Embree, `heads`: + libigl and Embree,
-#                                   `clips`: + PyBullet
+#                                   `clips`: + PyBullet, `adapters`: + supervision and rerun
 #
 # PYTHON chooses the interpreter (default python3, 3.11 or newer).
 # Exit status: 0 complete; 69 the package index cannot be reached; 1 anything else.

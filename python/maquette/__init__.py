@@ -6,9 +6,13 @@
 Errors of the SDK are MaquetteError. README.md of the package shows each system.
 """
 
+from __future__ import annotations
+
+from typing import Any
+
 from maquette.densepose import DensePose, DensePoseResult, Person, part_colours, part_name
 from maquette.edges import Box, Curve, Curves, Edges, EdgesResult
-from maquette.frames import Camera, Frame, Intrinsics, Origin, PixelFormat, Source, list_cameras
+from maquette.frames import Frame, Intrinsics, Origin, PixelFormat
 from maquette.fusion import EdgesFusion
 from maquette.heads import (
     Head,
@@ -22,19 +26,59 @@ from maquette.heads import (
 )
 from maquette.images import Image
 from maquette.native import MaquetteError, library_path, native
+from maquette.pipeline import (
+    DensePoseModel,
+    EdgesModel,
+    Model,
+    Pipeline,
+    PipelineInfo,
+    PipelineResult,
+    PredictionModel,
+)
 from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
-from maquette.scenes import Capture, PinholeCamera, Scene, SceneRenderer, View
+from maquette.scenes import Capture, PinholeCamera, Scene, SceneBuilder, SceneRenderer, View
+from maquette.sources import (
+    Camera,
+    CameraMode,
+    ClipWriter,
+    Control,
+    Recorder,
+    Source,
+    SourceScheme,
+    list_cameras,
+    list_source_schemes,
+)
 
 __all__ = [
-    "Box", "Camera", "Capture", "Concealer", "Curve", "Curves", "DensePose", "DensePoseResult", "Edges", "EdgesFusion",
-    "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
-    "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "MorphTarget", "Novelty", "NoveltyScore", "Origin",
-    "Person", "PinholeCamera", "PixelFormat", "Predictor", "Scene", "SceneRenderer", "Source", "View",
-    "library_path", "list_cameras", "part_colours", "part_name", "sdk_version",
+    "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
+    "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
+    "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
+    "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",
+    "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "Recorder", "Scene",
+    "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
+    "list_source_schemes", "part_colours", "part_name",
 ]  # fmt: skip
 
+__version__: str
 
-def sdk_version() -> str:
-    """The version of the library found at run time: "0.3.0"."""
+
+def __getattr__(name: str) -> Any:
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     n = native()
-    return n.ffi.string(n.lib.maq_get_sdk_version()).decode()
+    return n.text(n.lib.maq_get_sdk_version())  # of the library found at run time: "0.3.0"
+
+
+def build_info() -> dict[str, str]:
+    """Version, git commit and build options of the library, and version and file of ONNX Runtime. Raises MaquetteError
+    where ONNX Runtime is not found."""
+    n = native()
+    version, path = n.ffi.new("const char **"), n.ffi.new("const char **")
+    n.call("maq_context_get_onnxruntime", n.context, version, path)
+    return {
+        "version": n.text(n.lib.maq_get_sdk_version()),
+        "git_commit": n.text(n.lib.maq_get_git_commit()),
+        "build_options": n.text(n.lib.maq_get_build_options()),
+        "onnxruntime": n.text(version[0]),
+        "onnxruntime_library": n.text(path[0]),
+    }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 from cffi import FFI
 
@@ -41,6 +42,15 @@ def write_module(headers: Path, path: Path) -> None:
     ffi = read_headers(headers)
     ffi.set_source(path.stem, None)
     ffi.emit_python_code(str(path))
+
+
+def enum_names(kind: Any) -> dict[str, int]:
+    """Values of an enum of cffi by short names: "off", "auto" and "all" of maq_densepose_crops."""
+    values = dict(sorted((value, name) for name, value in kind.relements.items()))
+    first, last = min(values.values()), max(values.values())
+    common = next((k for k in range(len(first)) if first[k] != last[k : k + 1]), len(first))
+    start = first.rfind("_", 0, common) + 1
+    return {name[start:].lower(): value for value, name in values.items()}
 
 
 def _with_what_it_includes(headers: Path, name: str, before: list[str]) -> list[str]:

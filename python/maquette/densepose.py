@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.frames import Frame, as_frame
-from maquette.native import NativeObject, native
+from maquette.frames import ImageLike, as_frame
+from maquette.native import Lender, LentResult, NativeObject, native
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from maquette.settings import DensePoseSettings, PartColours
 
 PART_COUNT = 24
 
@@ -18,11 +23,13 @@ PART_COUNT = 24
 @dataclass(frozen=True)
 class Person:
     """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1. head_box_px:
-    around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does."""
+    around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does. id: the same number for one
+    person in several frames; None in this version, which does not track people."""
 
     box_px: tuple[float, float, float, float]
     score: float
     head_box_px: tuple[float, float, float, float] | None
+    id: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,52 +43,82 @@ class DensePoseResult:
     u: np.ndarray
     v: np.ndarray
     person: np.ndarray
-    stats: dict[str, float]
+    stats: dict[str, Any]
+    _lent: LentResult = field(repr=False)
 
-    def painted(self, image: np.ndarray, opacity: float = 0.7) -> np.ndarray:
-        """image: uint8 [H, W, 3] RGB. A copy with the people in the colours of their parts."""
-        body = self.part > 0
-        out = image.copy()
-        colours = part_colours()[self.part[body]]
-        out[body] = np.round((1 - opacity) * image[body] + opacity * colours).astype(np.uint8)
+    @property
+    def iuv(self) -> np.ndarray:
+        """uint8 [H, W, 3]: part, u, v; the channels that DensePose's tools expect."""
+        return np.stack([self.part, self.u, self.v], axis=-1)
+
+    def draw(
+        self,
+        image: ImageLike | None = None,
+        opacity: int = 180,
+        colours: PartColours = "default",
+        is_mirrored: bool = False,
+    ) -> np.ndarray:
+        """Draws the people in the colours of their parts: uint8 [H, W, 4], RGBA. image: under the people; None:
+        transparent, and colours are multiplied by their opacity. opacity: 1 to 255. colours: "default", "detectron2"
+        or "magicanimate" (`maquette.adapters.detectron2`). Works for the latest 8 results of a `DensePose`. Raises
+        MaquetteError."""
+        n = native()
+        settings = {"opacity": opacity, "colours": colours, "is_mirrored": is_mirrored}
+        drawing = n.config("maq_densepose_drawing", settings)
+        frame = n.ffi.NULL if image is None else as_frame(image).handle
+        out = np.empty((*self.part.shape, 4), np.uint8)
+        into = n.ffi.from_buffer("uint8_t[]", out)
+        n.call("maq_densepose_result_draw", self._lent.handle, frame, drawing, into, 0, out.nbytes)
         return out
+
+    def painted(self, image: ImageLike, opacity: float = 0.7) -> np.ndarray:
+        """A copy of the image, uint8 [H, W, 3] RGB, with the people in the colours of their parts."""
+        rgb = image if isinstance(image, np.ndarray) else as_frame(image).pixels()
+        body = self.part > 0
+        out = rgb.copy()
+        colours = part_colours()[self.part[body]]
+        out[body] = np.round((1 - opacity) * rgb[body] + opacity * colours).astype(np.uint8)
+        return out
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes <path>_IUV.png, <path>_INDS.png and <path>.json in the DensePose convention
+        (docs/reference/formats.md). Works for the latest 8 results of a `DensePose`. Raises MaquetteError."""
+        native().call("maq_densepose_result_save", self._lent.handle, os.fsencode(path))
+
+    def __repr__(self) -> str:
+        height, width = self.part.shape
+        count = len(self.people)
+        return f"<DensePoseResult {width} x {height}, {count} {'person' if count == 1 else 'people'}>"
 
 
 class DensePose(NativeObject):
     """The networks, loaded once and used for many images.
 
-        result = maquette.DensePose().run(rgb)
+        result = maquette.DensePose().run("photo.jpg")
 
     bundle: a folder with manifest.json (default: the one that comes with the package). settings: fields of
     maq_densepose_config by their names: long_side_px, person_crops, key_frame_interval, threads, score_threshold, ...
     (docs/guide/dense-pose.md says what they gain and cost). Raises MaquetteError.
     """
 
-    def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:
+    def __init__(self, bundle: str | os.PathLike[str] | None = None, **settings: Unpack[DensePoseSettings]) -> None:
         n = native()
-        if bundle is not None:
-            settings["bundle_path"] = Path(bundle)
-        super().__init__(n.create("maq_densepose", n.context, n.config("maq_densepose_config", settings)))
+        config = densepose_config(bundle, settings)
+        self._lender = Lender(config.result_pool_size)
+        super().__init__(n.create("maq_densepose", n.context, config))
 
-    def run(self, image: Frame | np.ndarray) -> DensePoseResult:
-        """image: a Frame, or uint8 [H, W, 3] RGB. One call at a time. Raises MaquetteError."""
-        n = native()
+    def run(self, image: ImageLike) -> DensePoseResult:
+        """image: a Frame, uint8 [H, W, 3] RGB, an image of Pillow, or the path of an image file. One call at a time.
+        Raises MaquetteError."""
         frame = as_frame(image)
-        result = n.create("maq_densepose_result", self.handle, frame.handle, function="maq_densepose_run",
-                          release="maq_densepose_result_release")  # fmt: skip
-        count = n.lib.maq_densepose_result_get_person_count(result)
-        found = n.indexed("maq_densepose_result_get_person", result, "maq_densepose_person", count)
-        people = [Person(tuple(p.box_px), p.score, _head_box_px(result, index)) for index, p in enumerate(found)]
-        planes = [
-            n.plane("maq_densepose_result_get_plane", result, plane, frame.shape, np.uint8)
-            for plane in (
-                n.lib.MAQ_DENSEPOSE_PLANE_PART, n.lib.MAQ_DENSEPOSE_PLANE_U, n.lib.MAQ_DENSEPOSE_PLANE_V,
-                n.lib.MAQ_DENSEPOSE_PLANE_PERSON,
-            )
-        ]  # fmt: skip
-        stats = n.stats("maq_densepose_stats", "maq_densepose_result_get_stats", result)
-        n.ffi.release(result)
-        return DensePoseResult(people, *planes, stats)
+        self._lender.make_room()
+        result = native().create("maq_densepose_result", self.handle, frame.handle, function="maq_densepose_run",
+                                 release="maq_densepose_result_release")  # fmt: skip
+        return densepose_result(result, self._lender.lend(result))
+
+    def cancel(self) -> None:
+        """Ends the running `run`, or else the next one, with MAQ_CANCELLED. Any thread may call it."""
+        native().call("maq_densepose_cancel", self.handle)
 
     def set_roll(self, roll_rad: float) -> None:
         """The next images show the world rotated clockwise by this many radians (-7 to 7), as of a camera that is held
@@ -95,12 +132,46 @@ class DensePose(NativeObject):
     def surface(self) -> np.ndarray:
         """float32 [24, nodes, nodes, 3]: the point of the body at rest for each part, U and V, in metres: x to the
         body's left, y to its back, z up. NaN where the part's chart does not reach. Raises MaquetteError."""
-        n = native()
-        struct = n.sized("maq_densepose_surface")
-        n.call("maq_densepose_get_surface", self.handle, struct)
-        shape = (PART_COUNT, struct.nodes, struct.nodes, 3)
-        data = n.ffi.buffer(struct.points_m, 4 * int(np.prod(shape)))
-        return np.frombuffer(data, np.float32).reshape(shape).copy()
+        return surface_points("maq_densepose_get_surface", self.handle)
+
+
+def densepose_config(bundle: str | os.PathLike[str] | None, settings: DensePoseSettings) -> Any:
+    """A maq_densepose_config."""
+    own = {} if bundle is None else {"bundle_path": bundle}
+    return native().config("maq_densepose_config", {"result_pool_size": 8, **settings, **own})
+
+
+def densepose_result(result: Any, lent: LentResult) -> DensePoseResult:
+    """Copies a maq_densepose_result to arrays."""
+    n = native()
+    size = n.ffi.new("int32_t *"), n.ffi.new("int32_t *")
+    n.call("maq_densepose_result_get_size", result, *size)
+    shape = size[1][0], size[0][0]
+    count = n.lib.maq_densepose_result_get_person_count(result)
+    found = n.indexed("maq_densepose_result_get_person", result, "maq_densepose_person", count)
+    people = [
+        Person(tuple(p.box_px), p.score, _head_box_px(result, index), None if p.id == n.lib.MAQ_NO_ID else p.id)
+        for index, p in enumerate(found)
+    ]
+    planes = [
+        n.plane("maq_densepose_result_get_plane", result, plane, shape, np.uint8)
+        for plane in (
+            n.lib.MAQ_DENSEPOSE_PLANE_PART, n.lib.MAQ_DENSEPOSE_PLANE_U, n.lib.MAQ_DENSEPOSE_PLANE_V,
+            n.lib.MAQ_DENSEPOSE_PLANE_PERSON,
+        )
+    ]  # fmt: skip
+    stats = n.stats("maq_densepose_stats", "maq_densepose_result_get_stats", result)
+    return DensePoseResult(people, *planes, stats, lent)
+
+
+def surface_points(function: str, handle: Any) -> np.ndarray:
+    """The surface that `function`, maq_…_get_surface, gives."""
+    n = native()
+    struct = n.sized("maq_densepose_surface")
+    n.call(function, handle, struct)
+    shape = (PART_COUNT, struct.nodes, struct.nodes, 3)
+    data = n.ffi.buffer(struct.points_m, 4 * int(np.prod(shape)))
+    return np.frombuffer(data, np.float32).reshape(shape).copy()
 
 
 def _head_box_px(result: Any, index: int) -> tuple[float, ...] | None:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.frames import Frame, Intrinsics
-from maquette.native import NativeObject, native
+from maquette.frames import Frame, ImageLike, Intrinsics, as_depth
+from maquette.native import Lender, LentResult, NativeObject, native
 
-KINDS = ("none", "crease", "boundary")
-TYPES = ("line", "arc", "spline")
-CONVEXITIES = ("unknown", "convex", "concave")
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from typing_extensions import Unpack
+
+    from maquette.settings import CurvesSettings, EdgesSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,9 @@ class Curve:
     length_m: float
     rms_footprints: float
 
+    def __repr__(self) -> str:
+        return f"<Curve {self.type}, {self.kind}, {self.length_m:.3f} m>"
+
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -44,6 +50,10 @@ class Box:
     centre_m: np.ndarray
     corner_count: int
 
+    def __repr__(self) -> str:
+        sides = (f"{1000 * s:.0f} ± {1000 * t:.0f}" for s, t in zip(self.size_m, self.size_tolerance_m))  # noqa: B905
+        return f"<Box {' x '.join(sides)} mm>"
+
 
 class Curves(NativeObject):
     """The curves of a depth image: `curves`, `corners_m` float64 [n, 3], and `boxes`, the largest first. curves_ms,
@@ -56,7 +66,8 @@ class Curves(NativeObject):
                           n.lib.maq_edges_curves_get_curve_count(handle))  # fmt: skip
         self.curves = [
             Curve(
-                _doubles(c.points_m, c.point_count, 3), TYPES[c.type], KINDS[c.kind], CONVEXITIES[c.convexity],
+                _doubles(c.points_m, c.point_count, 3), n.name_of("maq_edges_curve_type", c.type),
+                n.name_of("maq_edges_kind", c.kind), n.name_of("maq_edges_convexity", c.convexity),
                 tuple(c.corners), c.length_m, c.rms_footprints,
             )
             for c in found
@@ -77,19 +88,42 @@ class Curves(NativeObject):
         stats = n.stats("maq_edges_curves_stats", "maq_edges_curves_get_stats", handle)
         self.curves_ms, self.boxes_ms = stats["curves_ms"], stats["boxes_ms"]
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes .json, .obj, .ply, .dxf or .step. Raises MaquetteError."""
-        native().call("maq_edges_curves_save", self.handle, str(path).encode())
+        native().call("maq_edges_curves_save", self.handle, os.fsencode(path))
 
     def snap(self, x_px: float, y_px: float, radius_px: float = 8) -> tuple[str, np.ndarray] | None:
         """Finds the target at a pixel of the depth image: the nearest corner within the radius, or else the nearest
         curve, or else an adjacent plane. Returns its kind ("corner", "curve", "plane") and its point, float64 [3] in
         metres; None without a target."""
+        return self._snapped("maq_edges_curves_snap_to_pixel", x_px, y_px, radius_px)
+
+    def snap_to_ray(
+        self, origin_m: Sequence[float], direction: Sequence[float], max_angle_rad: float = 0.02
+    ) -> tuple[str, np.ndarray] | None:
+        """Finds the target of a ray, in the coordinates of the curves: the nearest corner within the angle seen from
+        the origin, or else the nearest curve, or else the first plane. Returns the same as `snap`."""
+        ray = [float(v) for v in origin_m], [float(v) for v in direction]
+        return self._snapped("maq_edges_curves_snap_to_ray", *ray, max_angle_rad)
+
+    def _snapped(self, function: str, *position: Any) -> tuple[str, np.ndarray] | None:
         n = native()
         found = n.sized("maq_edges_snap")
-        n.call("maq_edges_curves_snap_to_pixel", self.handle, x_px, y_px, radius_px, found)
-        targets = ("nothing", "corner", "curve", "plane")
-        return (targets[found.target], np.array(list(found.point_m))) if found.target else None
+        n.call(function, self.handle, *position, found)
+        target = n.name_of("maq_edges_snap_target", found.target)
+        return (target, np.array(list(found.point_m))) if found.target else None
+
+    def _about(self) -> str:
+        return f"{len(self.curves)} curves, {len(self.corners_m)} corners, {len(self.boxes)} boxes"
+
+    def __reduce__(self) -> Any:  # a copy, or in another process, has arrays alone
+        return _closed_curves, (self.__dict__ | {"_handle": None},)
+
+
+def _closed_curves(state: dict[str, Any]) -> Curves:
+    curves = Curves.__new__(Curves)
+    curves.__dict__.update(state)
+    return curves
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +139,18 @@ class EdgesResult:
     distance_m: np.ndarray
     eps_r: float
     curves: Curves | None
-    stats: dict[str, float]
+    stats: dict[str, Any]
+    _lent: LentResult = field(repr=False)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes <path>_distance.png, <path>_kind.png and <path>_edges.json (docs/reference/formats.md). Works for the
+        latest 16 results of an `Edges`. Raises MaquetteError."""
+        native().call("maq_edges_result_save", self._lent.handle, os.fsencode(path))
+
+    def __repr__(self) -> str:
+        height, width = self.kind.shape
+        curves = "" if self.curves is None else f", {self.curves._about()}"
+        return f"<EdgesResult {width} x {height}{curves}>"
 
 
 class Edges(NativeObject):
@@ -118,23 +163,23 @@ class Edges(NativeObject):
     of its model by their names: skip_planes, threads, ... Raises MaquetteError.
     """
 
-    def __init__(self, bundle: str | Path | None = None, **settings: Any) -> None:
+    def __init__(self, bundle: str | os.PathLike[str] | None = None, **settings: Unpack[EdgesSettings]) -> None:
         n = native()
-        if bundle is not None:
-            settings["bundle_path"] = Path(bundle)
-        settings.setdefault("result_pool_size", 16)
-        super().__init__(n.create("maq_edges", n.context, n.config("maq_edges_config", settings)))
+        config = edges_config(bundle, settings)
+        self._lender = Lender(config.result_pool_size)
+        super().__init__(n.create("maq_edges", n.context, config))
 
     def run(
         self,
-        depth: Frame | np.ndarray,
+        depth: ImageLike,
         intrinsics: Intrinsics | None = None,
         curves: bool = False,
-        **curve_settings: Any,
+        **curve_settings: Unpack[CurvesSettings],
     ) -> EdgesResult:
-        """depth: a Frame with its intrinsics, float32 [H, W] in metres or uint16 [H, W] in millimetres. intrinsics: for
-        an array. curves: also find curves, corners and boxes. curve_settings: fields of maq_edges_curves_config. One
-        call at a time. Raises MaquetteError; ValueError for a Frame with other intrinsics."""
+        """depth: a Frame with its intrinsics, float32 [H, W] in metres, uint16 [H, W] in millimetres, or the path of a
+        depth image in millimetres. intrinsics: for all but a Frame. curves: also find curves, corners and boxes.
+        curve_settings: fields of maq_edges_curves_config. One call at a time. Raises MaquetteError; ValueError for a
+        Frame with other intrinsics."""
         result = self.run_native(depth, intrinsics)
         found = None
         if curves:
@@ -142,33 +187,48 @@ class Edges(NativeObject):
             config = n.config("maq_edges_curves_config", curve_settings)
             find, release = "maq_edges_result_find_curves", "maq_edges_curves_release"
             found = Curves(n.create("maq_edges_curves", result, config, function=find, release=release))
-        return self.copied(result, found)
+        return edges_result(result, self._lender.lend(result), found)
 
-    def run_native(self, depth: Frame | np.ndarray, intrinsics: Intrinsics | None = None) -> Any:
+    def run_native(self, depth: ImageLike, intrinsics: Intrinsics | None = None) -> Any:
         """Returns the library's own result (maq_edges_result), for calls of the C API that this package does not have.
         It goes back to its pool when the object is freed."""
         if isinstance(depth, Frame) and intrinsics is not None and depth.intrinsics != intrinsics:
             raise ValueError("The frame has its own intrinsics; wrap an array as Frame(depth, intrinsics=...) instead.")
-        frame = depth if isinstance(depth, Frame) else Frame(depth, intrinsics=intrinsics)
+        frame = as_depth(depth, intrinsics)
+        self._lender.make_room()
         run, release = "maq_edges_run", "maq_edges_result_release"
         return native().create("maq_edges_result", self.handle, frame.handle, function=run, release=release)
 
-    def copied(self, result: Any, curves: Curves | None = None) -> EdgesResult:
-        """Copies a result of `run_native` to arrays, and returns it to its pool."""
-        n = native()
-        field = n.sized("maq_edges_field")
-        n.call("maq_edges_result_get_field", result, field)
-        shape = field.height_px, field.width_px
-        wanted = (
-            (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_EXPECTED_ERROR, np.float32),
-            (n.lib.MAQ_EDGES_PLANE_KIND, np.uint8),
-        )  # fmt: skip
-        planes = [n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted]
-        metres = np.empty(shape, np.float32)
-        n.call("maq_edges_result_copy_distance_m", result, n.ffi.from_buffer("float[]", metres), metres.size)
-        stats = n.stats("maq_edges_stats", "maq_edges_result_get_stats", result)
-        n.ffi.release(result)
-        return EdgesResult(*planes, metres, field.eps_r, curves, stats)
+    def copied(self, result: Any) -> EdgesResult:
+        """Copies a result of `run_native` to arrays."""
+        return edges_result(result, self._lender.lend(result))
+
+    def cancel(self) -> None:
+        """Ends the running `run`, or else the next one, with MAQ_CANCELLED. Any thread may call it."""
+        native().call("maq_edges_cancel", self.handle)
+
+
+def edges_config(bundle: str | os.PathLike[str] | None, settings: EdgesSettings) -> Any:
+    """A maq_edges_config."""
+    own = {} if bundle is None else {"bundle_path": bundle}
+    return native().config("maq_edges_config", {"result_pool_size": 16, **settings, **own})
+
+
+def edges_result(result: Any, lent: LentResult, curves: Curves | None = None) -> EdgesResult:
+    """Copies a maq_edges_result to arrays."""
+    n = native()
+    about = n.sized("maq_edges_field")
+    n.call("maq_edges_result_get_field", result, about)
+    shape = about.height_px, about.width_px
+    wanted = (
+        (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_EXPECTED_ERROR, np.float32),
+        (n.lib.MAQ_EDGES_PLANE_KIND, np.uint8),
+    )  # fmt: skip
+    planes = [n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted]
+    metres = np.empty(shape, np.float32)
+    n.call("maq_edges_result_copy_distance_m", result, n.ffi.from_buffer("float[]", metres), metres.size)
+    stats = n.stats("maq_edges_stats", "maq_edges_result_get_stats", result)
+    return EdgesResult(*planes, metres, about.eps_r, curves, stats, lent)
 
 
 def _doubles(pointer: Any, *shape: int) -> np.ndarray:

@@ -1,17 +1,20 @@
-"""Frames: numpy arrays on their way into the SDK and out of it; sources that deliver them."""
+"""Frames: images on their way into the SDK and out of it."""
 
 from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterator
+import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 
 from maquette.native import NativeObject, native
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class PixelFormat(enum.IntEnum):
@@ -25,6 +28,17 @@ class PixelFormat(enum.IntEnum):
     DEPTH32F = 8  # float32, metres; 0, negative, infinite and NaN are unknown
 
 
+class HasArrayInterface(Protocol):
+    """An image of Pillow, or another object that numpy reads."""
+
+    @property
+    def __array_interface__(self) -> dict[str, Any]: ...
+
+
+# An image: a Frame, an array or what numpy can read as one (Pillow, torch, ...), or the path of an image file.
+ImageLike = Union["Frame", "ArrayLike", HasArrayInterface, "os.PathLike[str]"]
+
+_MODES = ("RGB", "RGBA", "L", "I;16", "F")  # of Pillow: read as they are; all others are converted
 _KINDS = {
     PixelFormat.RGB8: (np.uint8, 3), PixelFormat.BGR8: (np.uint8, 3), PixelFormat.RGBA8: (np.uint8, 4),
     PixelFormat.GREY8: (np.uint8, 1), PixelFormat.DEPTH16: (np.uint16, 1), PixelFormat.DEPTH32F: (np.float32, 1),
@@ -77,33 +91,35 @@ class Origin:
 
 
 class Frame(NativeObject):
-    """One image with its format and time.
+    """One image with its format and time. `numpy.asarray(frame)` gives its pixels or its depth.
 
-    `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), uint8 [H, W]
-    (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Don't write to the array while a
-    model reads it. intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the
-    time, the number and, if they are known, the intrinsics of the camera.
+    `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), [H, W, 4]
+    (RGBA) or [H, W] (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Images of Pillow,
+    tensors on the CPU, and other objects that numpy reads work, too. Don't write to the array while a model reads it.
+    intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the time, the number
+    and, if they are known, the intrinsics of the camera. Raises ValueError for an array that is no such image.
     """
 
     def __init__(
         self,
-        pixels: np.ndarray,
+        pixels: ArrayLike | HasArrayInterface,
         format: PixelFormat | None = None,
         timestamp_ns: int = 0,
         intrinsics: Intrinsics | None = None,
     ) -> None:
-        format = _format_of(pixels) if format is None else PixelFormat(format)
+        array = _array_of(pixels)
+        format = _format_of(array, pixels) if format is None else PixelFormat(format)
         kind, channels = _KINDS[format]
-        shape = pixels.shape[:2] if channels == 1 and pixels.ndim == 2 else (*pixels.shape[:2], channels)
-        if pixels.dtype != kind or pixels.shape != shape or pixels.ndim < 2:
+        shape = array.shape[:2] if channels == 1 and array.ndim == 2 else (*array.shape[:2], channels)
+        if array.dtype != kind or array.shape != shape or array.ndim < 2:
             wanted = f"{np.dtype(kind)} [H, W{'' if channels == 1 else f', {channels}'}]"
-            raise ValueError(f"{format.name} is {wanted}, not {pixels.dtype} {list(pixels.shape)}")
+            raise ValueError(f"{format.name} is {wanted}, not {array.dtype} {list(array.shape)}")
         n = native()
-        self._pixels = np.ascontiguousarray(pixels)
+        self._pixels = np.ascontiguousarray(array)
         description = n.sized("maq_frame_desc")
         n.call("maq_frame_desc_init", description, description.struct_size)
         description.format, description.timestamp_ns = int(format), timestamp_ns
-        description.height_px, description.width_px = pixels.shape[:2]
+        description.height_px, description.width_px = array.shape[:2]
         if intrinsics is not None:
             intrinsics.write_to(description.intrinsics)
         description.planes[0] = n.ffi.cast("const uint8_t *", n.ffi.from_buffer(self._pixels))
@@ -118,19 +134,79 @@ class Frame(NativeObject):
         return frame
 
     @staticmethod
+    def open(
+        path: str | os.PathLike[str], depth_unit_m: float | None = None, intrinsics: Intrinsics | None = None
+    ) -> Frame:
+        """Reads an image file, upright by its EXIF orientation. depth_unit_m: the file is a depth image in this unit,
+        0.001 for millimetres; `intrinsics` are of its camera. Raises MaquetteError, and OSError for a file that cannot
+        be read."""
+        if depth_unit_m is None:
+            return Frame.decode(Path(path).read_bytes())
+        with open(path, "rb"):  # a missing file is Python's FileNotFoundError
+            n, escaped = native(), os.fspath(path).replace("%", "%25").replace("?", "%3F")
+        uri = f"image:{escaped}?depth_unit={depth_unit_m:g}".encode()
+        source = n.create("maq_source", n.context, uri, n.ffi.NULL)
+        depth = n.wait("maq_source_acquire_frame", source, "maq_frame", "maq_frame_release", None)
+        return Frame(Frame.of_handle(depth).depth(), intrinsics=intrinsics)
+
+    @staticmethod
     def decode(data: bytes) -> Frame:
-        """A whole JPEG, PNG, WebP, BMP or TIFF file in memory. Raises MaquetteError."""
+        """Decodes a whole JPEG, PNG, WebP, BMP or TIFF file in memory. Raises MaquetteError."""
+        n, decode = native(), "maq_frame_decode"
+        data_and_size = n.ffi.from_buffer(data), len(data)
+        handle = n.create("maq_frame", n.context, *data_and_size, function=decode, release="maq_frame_release")
+        return Frame.of_handle(handle)
+
+    @staticmethod
+    def of_yuv(
+        y: np.ndarray,
+        u: np.ndarray,
+        v: np.ndarray,
+        is_video_range: bool = False,
+        rotation_deg: int = 0,
+        timestamp_ns: int = 0,
+    ) -> Frame:
+        """Copies an image in three planes (YUV 4:2:0), and rotates it clockwise. y: uint8 [H, W]; u, v: uint8
+        [ceil(H / 2), ceil(W / 2)]. is_video_range: Y from 16 to 235, as in clips; otherwise 0 to 255. Raises
+        MaquetteError."""
         n = native()
+        planes = [np.ascontiguousarray(plane, np.uint8) for plane in (y, u, v)]
+        half = tuple((side + 1) // 2 for side in planes[0].shape)
+        if planes[0].ndim != 2 or planes[1].shape != half or planes[2].shape != half:
+            shapes = ", ".join(str(list(plane.shape)) for plane in planes)
+            raise ValueError(f"The planes are {shapes}; u and v have half the height and width of y, rounded up.")
+        image = n.config("maq_yuv_image", {"rotation_deg": rotation_deg, "timestamp_ns": timestamp_ns})
+        image.height_px, image.width_px = planes[0].shape
+        image.is_video_range = is_video_range
+        for k, plane in enumerate(planes):
+            image.planes[k] = n.ffi.cast("const uint8_t *", n.ffi.from_buffer(plane))
+            image.size_bytes[k], image.stride_bytes[k], image.pixel_stride_bytes[k] = plane.nbytes, plane.shape[1], 1
+        convert, release = "maq_frame_convert_yuv", "maq_frame_release"
+        return Frame.of_handle(n.create("maq_frame", n.context, image, function=convert, release=release))
+
+    def resized(self, width_px: int, height_px: int) -> Frame:
+        """Copies a colour frame to another size, with intrinsics that fit. Raises MaquetteError."""
+        n, resize = native(), "maq_frame_resize"
+        size = int(width_px), int(height_px)
         return Frame.of_handle(
-            n.create(
-                "maq_frame",
-                n.context,
-                n.ffi.from_buffer(data),
-                len(data),
-                function="maq_frame_decode",
-                release="maq_frame_release",
-            )
-        )
+            n.create("maq_frame", self.handle, *size, function=resize, release="maq_frame_release")
+        )  # fmt: skip
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        if copy is False:
+            raise ValueError("The pixels of a Frame are copied; ask numpy with copy=None.")
+        format = self._description().format
+        if format in (PixelFormat.DEPTH16, PixelFormat.DEPTH32F):
+            array = self.depth()
+        else:
+            array = self.pixels(PixelFormat.GREY8 if format == PixelFormat.GREY8 else PixelFormat.RGB8)
+        return array if dtype is None else array.astype(dtype)
+
+    def _about(self) -> str:
+        about = self._description()
+        format = native().name_of("maq_pixel_format", about.format).upper()
+        marks = ", predicted" if self.origin else ""
+        return f"{about.width_px} x {about.height_px} {format}, {about.timestamp_ns / 1e9:.3f} s{marks}"
 
     def _description(self) -> Any:
         n = native()
@@ -194,90 +270,64 @@ class Frame(NativeObject):
         known = np.isfinite(raw) & (raw > 0) & (raw < (np.inf if is_float else 65535))
         return np.where(known, raw * np.float32(unit), 0).astype(np.float32)
 
-    def save(self, path: str | Path) -> None:
-        """Writes .png or .jpg. Raises MaquetteError."""
-        native().call("maq_frame_save", self.handle, str(path).encode())
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes .png or .jpg; depth as .png in millimetres or .tif in metres. Raises MaquetteError."""
+        native().call("maq_frame_save", self.handle, os.fsencode(path))
 
 
-def _format_of(pixels: np.ndarray) -> PixelFormat:
-    if pixels.dtype == np.uint16:
-        return PixelFormat.DEPTH16
-    if pixels.dtype == np.float32:
-        return PixelFormat.DEPTH32F
-    return PixelFormat.GREY8 if pixels.ndim == 2 else PixelFormat.RGBA8 if pixels.shape[-1] == 4 else PixelFormat.RGB8
+def _array_of(pixels: Any) -> np.ndarray:
+    mode = getattr(pixels, "mode", None)
+    if isinstance(mode, str) and mode not in _MODES and hasattr(pixels, "convert"):  # palettes, CMYK, ... of Pillow
+        pixels = pixels.convert("RGB")
+    array = np.asarray(pixels)
+    if array.ndim == 2 and array.dtype in (np.float64, np.float16):
+        return array.astype(np.float32)
+    return array
 
 
-def as_frame(image: Frame | np.ndarray) -> Frame:
-    return image if isinstance(image, Frame) else Frame(image)
+def _format_of(array: np.ndarray, given: Any) -> PixelFormat:
+    """The format of an array that is an image. Raises ValueError, with a hint."""
+    formats = {
+        (np.dtype(np.uint8), 3, 3): PixelFormat.RGB8, (np.dtype(np.uint8), 3, 4): PixelFormat.RGBA8,
+        (np.dtype(np.uint8), 2, 1): PixelFormat.GREY8, (np.dtype(np.uint16), 2, 1): PixelFormat.DEPTH16,
+        (np.dtype(np.float32), 2, 1): PixelFormat.DEPTH32F,
+    }  # fmt: skip
+    found = formats.get((array.dtype, array.ndim, array.shape[2] if array.ndim == 3 else 1))
+    if found is not None:
+        return found
+    hint = ""
+    if array.ndim == 3 and array.shape[0] in (3, 4) and array.shape[2] not in (3, 4):
+        hint = "; the channels come last: numpy.moveaxis(image, 0, -1)"
+    elif array.ndim == 3 and array.dtype.kind == "f":
+        hint = "; colours from 0 to 1 become bytes by (image * 255).round().astype(numpy.uint8)"
+    elif array.ndim == 2 and array.dtype.kind in "iu":
+        hint = "; depth in millimetres becomes image.astype(numpy.uint16)"
+    elif array.ndim == 4:
+        hint = "; pass one image at a time"
+    shape = f"{array.dtype} {list(array.shape)}" if array.ndim else f"{given!r:.60}"
+    raise ValueError(
+        "An image is uint8 [H, W, 3], [H, W, 4] or [H, W], or depth: uint16 [H, W] in millimetres or float32 [H, W] in "
+        f"metres, but this {type(given).__name__} is {shape}{hint}."
+    )
+
+
+def as_frame(image: ImageLike) -> Frame:
+    if isinstance(image, Frame):
+        return image
+    return Frame.open(image) if isinstance(image, (str, os.PathLike)) else Frame(image)
+
+
+def as_depth(image: ImageLike, intrinsics: Intrinsics | None = None) -> Frame:
+    """A path is the path of a depth image in millimetres."""
+    if isinstance(image, Frame):
+        return image
+    if isinstance(image, (str, os.PathLike)):
+        return Frame.open(image, depth_unit_m=0.001, intrinsics=intrinsics)
+    return Frame(image, intrinsics=intrinsics)
 
 
 def acquired_frame(function: str, handle: Any, timeout_s: float | None) -> Frame | None:
     """The frame that `function`, one of maq_…_acquire_frame, waits for; None after the last one. Raises MaquetteError,
     TimeoutError."""
-    n = native()
-    out = n.ffi.new("maq_frame **")
-    limit = n.lib.MAQ_WAIT_FOREVER if timeout_s is None else round(timeout_s * 1e9)
-    status = n.ask(function, handle, limit, out)
-    if status == n.lib.MAQ_END_OF_STREAM:
-        return None
-    if status == n.lib.MAQ_TIMEOUT:
-        raise TimeoutError(f"no frame came within {timeout_s:g} s")
-    if status:
-        n.fail(function, status)
-    return Frame.of_handle(n.ffi.gc(out[0], n.lib.maq_frame_release))
-
-
-class Source(NativeObject):
-    """A camera, file, recording or simulated scene, opened by a URI; iterate over it.
-
-    `Source("camera:")`, `Source("clip.mp4")`, `Source("stub:people?count=2")`: docs/cameras.md has all of them.
-    settings: fields of maq_source_config by their names (queue_length, real_time, loop, ...). Raises MaquetteError.
-    """
-
-    def __init__(self, uri: str | Path, **settings: Any) -> None:
-        n = native()
-        config = n.config("maq_source_config", settings)
-        super().__init__(n.create("maq_source", n.context, str(uri).encode(), config))
-
-    @property
-    def info(self) -> dict[str, float]:
-        """Size, rate, number of frames and what was dropped: the fields of maq_source_info."""
-        return native().stats("maq_source_info", "maq_source_get_info", self.handle)
-
-    @property
-    def intrinsics(self) -> Intrinsics:
-        """Raises MaquetteError where they are unknown."""
-        n = native()
-        struct = n.ffi.new("maq_intrinsics *")
-        n.call("maq_source_get_intrinsics", self.handle, struct)
-        return Intrinsics.of_struct(struct)
-
-    def read(self, timeout_s: float | None = None) -> Frame | None:
-        """The next frame, or None after the last one. timeout_s: of live sources (None: no limit). Raises
-        MaquetteError, TimeoutError."""
-        return acquired_frame("maq_source_acquire_frame", self.handle, timeout_s)
-
-    def __iter__(self) -> Iterator[Frame]:
-        while (frame := self.read()) is not None:
-            yield frame
-
-
-@dataclass(frozen=True)
-class Camera:
-    """A connected camera. problem: why it cannot be opened now and what to do, "" if it can."""
-
-    uri: str
-    name: str
-    problem: str
-
-
-def list_cameras() -> list[Camera]:
-    n = native()
-    cameras = n.create("maq_camera_list", n.context)
-
-    def text(value: Any) -> str:
-        return n.ffi.string(value).decode() if value else ""
-
-    count = n.lib.maq_camera_list_get_count(cameras)
-    found = n.indexed("maq_camera_list_get_camera", cameras, "maq_camera_info", count)
-    return [Camera(text(c.uri), text(c.name), text(c.problem) if c.status else "") for c in found]
+    frame = native().wait(function, handle, "maq_frame", "maq_frame_release", timeout_s)
+    return None if frame is None else Frame.of_handle(frame)

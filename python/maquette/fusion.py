@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from maquette.edges import Curves, Edges, EdgesResult
-from maquette.frames import Frame
+from maquette.frames import Frame, ImageLike
 from maquette.native import NativeObject, ProgressCallback, native
 from maquette.scenes import PinholeCamera
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from maquette.settings import EdgesFusionSettings
 
 # maq_edges_fusion_point
 POINT = np.dtype([("point_m", "<f8", 3), ("normal", "<f4", 3), ("distance_m", "<f4"), ("r_m", "<f4"),
@@ -26,15 +31,18 @@ class EdgesFusion(NativeObject):
     """
 
     def __init__(
-        self, edges: Edges, progress: Callable[[float], bool | None] | None = None, **settings: Any
-    ) -> None:  # fmt: skip
+        self,
+        edges: Edges,
+        progress: Callable[[float], bool | None] | None = None,
+        **settings: Unpack[EdgesFusionSettings],
+    ) -> None:
         n = native()
         self._edges = edges
         self._progress = ProgressCallback(progress, "int32_t(void *, double)")
         config = n.config("maq_edges_fusion_config", {**settings, "progress_callback": self._progress.pointer})
         super().__init__(n.create("maq_edges_fusion", n.context, config))
 
-    def add_view(self, depth: Frame | np.ndarray, camera: PinholeCamera) -> EdgesResult:
+    def add_view(self, depth: ImageLike, camera: PinholeCamera) -> EdgesResult:
         """Runs the network on a depth image and adds its field. Returns the field."""
         result = self._edges.run_native(depth, None if isinstance(depth, Frame) else camera.intrinsics)
         self.add_native(result, camera)
@@ -48,6 +56,10 @@ class EdgesFusion(NativeObject):
         """Computes points and curves of the views so far; more can be added afterwards."""
         self._progress.run(lambda: native().call("maq_edges_fusion_finish", self.handle))
 
+    def cancel(self) -> None:
+        """Ends the running `finish`, or else the next one, with MAQ_CANCELLED. Any thread may call it."""
+        native().call("maq_edges_fusion_cancel", self.handle)
+
     def curves(self) -> Curves:
         """Returns the curves of the latest `finish`, without boxes and snapping. Hold no more than 4 at once."""
         n = native()
@@ -57,7 +69,7 @@ class EdgesFusion(NativeObject):
         )  # fmt: skip
 
     @property
-    def info(self) -> dict[str, float]:
+    def info(self) -> dict[str, Any]:
         """Counts and times: the fields of maq_edges_fusion_info."""
         return native().stats("maq_edges_fusion_info", "maq_edges_fusion_get_info", self.handle)
 

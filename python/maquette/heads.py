@@ -7,21 +7,23 @@ are in metres: x to the person's left, y to the back of the head, z up, the orig
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.frames import Frame, as_frame
+from maquette.frames import ImageLike, as_depth, as_frame
 from maquette.images import Image, rendered
-from maquette.native import NativeObject, ProgressCallback, native
-from maquette.scenes import PinholeCamera
+from maquette.native import Lender, NativeObject, ProgressCallback, native
+from maquette.scenes import PinholeCamera, Progress
 
-SCALES = ("prior", "given", "depth")
-SHADINGS = ("colour", "shape", "normals", "template", "depth")
-TOPOLOGIES = ("field", "template")
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from maquette.settings import HeadBuilderSettings, HeadRendererSettings, HeadShading, HeadTopology
+
 _ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
 
 
@@ -72,6 +74,9 @@ class MorphTarget:
     name: str
     vertices: np.ndarray
     deltas_m: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"<MorphTarget {self.name}, {len(self.vertices)} vertices>"
 
 
 class HeadMesh(NativeObject):
@@ -148,10 +153,13 @@ class HeadMesh(NativeObject):
         """The largest distance of a vertex of the full mesh from this mesh."""
         return self._data.simplification_error_m
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh for other programs: .glb, .obj with a .mtl beside it, or .ply. GLB and OBJ have the texture,
         GLB also the morph targets. In files x is to the person's left, y up, z to the front. Raises MaquetteError."""
-        native().call("maq_head_mesh_save", self.handle, str(path).encode())
+        native().call("maq_head_mesh_save", self.handle, os.fsencode(path))
+
+    def _about(self) -> str:
+        return f"{self._data.vertex_count} vertices, {self._data.triangle_count} triangles"
 
 
 class Head(NativeObject):
@@ -159,13 +167,13 @@ class Head(NativeObject):
     pixels."""
 
     @staticmethod
-    def open(file: str | Path | bytes) -> Head:
+    def open(file: str | os.PathLike[str] | bytes) -> Head:
         """Reads a file that `save` wrote, by its path or its bytes; no network is needed. Raises MaquetteError."""
         n = native()
         if isinstance(file, bytes):
             data = n.ffi.from_buffer(file)
             return Head(n.create("maq_head", n.context, data, len(file), function="maq_head_open_memory"))
-        return Head(n.create("maq_head", n.context, str(file).encode(), function="maq_head_open"))
+        return Head(n.create("maq_head", n.context, os.fsencode(file), function="maq_head_open"))
 
     def scaled_by_distance(self, start: str, end: str, distance_m: float) -> Head:
         """Copies the head with the size at which two landmarks are `distance_m` apart (0.001 to 10), such as pupil_left
@@ -174,30 +182,35 @@ class Head(NativeObject):
         arguments = ("maq_head", self.handle, *names, float(distance_m))
         return Head(native().create(*arguments, function="maq_head_scale_by_distance"))
 
-    def scaled_by_depth(self, depth: Frame | np.ndarray, camera: int = 0) -> Head:
+    def scaled_by_depth(self, depth: ImageLike, camera: int = 0) -> Head:
         """Copies the head with the size at which it fits a depth image.
 
         depth: of the same view as the photo with this camera, in any size: a Frame that is depth or has depth, float32
-        [H, W] in metres or uint16 [H, W] in millimetres. Give that photo its focal_px: an
-        estimate that is 10 % too long makes the head 10 % too small. Raises MaquetteError, with the status
+        [H, W] in metres, uint16 [H, W] in millimetres, or the path of a depth image in millimetres. Give that photo its
+        focal_px: an estimate that is 10 % too long makes the head 10 % too small. Raises MaquetteError, with the status
         MAQ_ERROR_NOT_FOUND if half of the head has no depth that agrees with it.
         """
-        frame = as_frame(depth)
+        frame = as_depth(depth)
         arguments = ("maq_head", self.handle, camera, frame.handle)
         return Head(native().create(*arguments, function="maq_head_scale_by_depth"))
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a head file (.maqh), some 64 KB and the texture, atomically. Raises MaquetteError."""
-        native().call("maq_head_save", self.handle, str(path).encode())
+        native().call("maq_head_save", self.handle, os.fsencode(path))
 
     @property
     def info(self) -> HeadInfo:
         info = native().sized("maq_head_info")
         native().call("maq_head_get_info", self.handle, info)
-        return HeadInfo(info.photo_count, SCALES[info.scale], info.scale_sigma, info.texture_px)
+        scale = native().name_of("maq_head_scale", info.scale)
+        return HeadInfo(info.photo_count, scale, info.scale_sigma, info.texture_px)
 
-    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0, topology: str = "field",
-             bundle: str | Path | None = None) -> HeadMesh:  # fmt: skip
+    def _about(self) -> str:
+        info = self.info
+        return f"of {info.photo_count} photo{'' if info.photo_count == 1 else 's'}, size: {info.scale}"
+
+    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0, topology: HeadTopology = "field",
+             bundle: str | os.PathLike[str] | None = None) -> HeadMesh:  # fmt: skip
         """Makes a mesh of the surface, in a second or less.
 
         triangle_count: about this many, 100 or more, or "all"; 0: 60,000, or all if cell_m is given. cell_m: distance
@@ -210,9 +223,7 @@ class Head(NativeObject):
             if triangle_count != "all":
                 raise ValueError(f'triangle_count is "{triangle_count}"; it is a number or "all"')
             triangle_count = _ALL_TRIANGLES
-        if topology not in TOPOLOGIES:
-            raise ValueError(f'topology is "{topology}"; it is one of {", ".join(TOPOLOGIES)}')
-        settings = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": TOPOLOGIES.index(topology)}
+        settings: dict[str, Any] = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": topology}
         if bundle is not None:
             settings["bundle_path"] = bundle
         n = native()
@@ -261,36 +272,44 @@ class HeadBuilder(NativeObject):
         head.mesh().save("head.glb")
 
     bundle: a folder with manifest.json (default: the one in the package). texture: whether heads get a texture with
-    the photos' pixels; None: the SDK's choice, which is a texture in this version. settings: fields of maq_head_builder_config by their names:
-    threads, provider, texture_px (256 to 2048; default 1024), mirror_unseen, delight_texture, ... The part of each
-    photo around the head stays in memory until `clear` or `close`. Raises MaquetteError.
+    the photos' pixels; None: the SDK's choice, which is a texture in this version. settings: fields of
+    maq_head_builder_config by their names: threads, provider, texture_px (256 to 2048; default 1024), mirror_unseen,
+    delight_texture, ... The part of each photo around the head stays in memory until `clear` or `close`. Raises
+    MaquetteError.
     """
 
-    def __init__(self, bundle: str | Path | None = None, texture: bool | None = None, **settings: Any) -> None:
+    def __init__(
+        self,
+        bundle: str | os.PathLike[str] | None = None,
+        texture: bool | None = None,
+        **settings: Unpack[HeadBuilderSettings],
+    ) -> None:
         n = native()
-        if bundle is not None:
-            settings["bundle_path"] = Path(bundle)
-        if texture is not None:
-            settings["texture"] = n.lib.MAQ_HEAD_TEXTURE_ON if texture else n.lib.MAQ_HEAD_TEXTURE_OFF
         self._progress = _FitProgress()
         self._callback = ProgressCallback(self._progress)  # as long as the builder, which has its address
-        settings["progress_callback"] = self._callback.pointer
-        super().__init__(n.create("maq_head_builder", n.context, n.config("maq_head_builder_config", settings)))
+        own: dict[str, Any] = {"progress_callback": self._callback.pointer}
+        if bundle is not None:
+            own["bundle_path"] = bundle
+        if texture is not None:
+            own["texture"] = "on" if texture else "off"
+        config = n.config("maq_head_builder_config", {**settings, **own})
+        super().__init__(n.create("maq_head_builder", n.context, config))
 
     def add_photo(
         self,
-        image: Frame | np.ndarray,
+        image: ImageLike,
         box_px: Sequence[float] | None = None,
         roll_rad: float = 0,
         focal_px: float | None = None,
     ) -> None:
         """Encodes a photo. Several photos must show one person; each may have its own camera. See `photos`.
 
-        image: a Frame, or uint8 [H, W, 3] RGB or [H, W] grey. box_px: of the head with its hair: left, top, right,
-        bottom (`Person.head_box_px` of dense pose works); None: it is detected, reliably only for one large head per
-        photo. roll_rad: rotation of the head in the photo's plane, clockwise from upright; exact to some 30 degrees is
-        enough. focal_px: focal length in pixels of this photo; None: it is estimated. Raises MaquetteError, with the
-        status MAQ_ERROR_NOT_FOUND if there is no head; the builder stays as it was.
+        image: a Frame, uint8 [H, W, 3] RGB or [H, W] grey, an image of Pillow, or the path of an image file. box_px: of
+        the head with its hair: left, top, right, bottom (`Person.head_box_px` of dense pose works); None: it is
+        detected, reliably only for one large head per photo. roll_rad: rotation of the head in the photo's plane,
+        clockwise from upright; exact to some 30 degrees is enough. focal_px: focal length in pixels of this photo;
+        None: it is estimated. Raises MaquetteError, with the status MAQ_ERROR_NOT_FOUND if there is no head; the
+        builder stays as it was.
         """
         n = native()
         settings: dict[str, Any] = {"roll_rad": roll_rad}
@@ -319,7 +338,7 @@ class HeadBuilder(NativeObject):
     def fit(
         self,
         seconds: float = 3.0,
-        progress: Callable[[float, str], bool | None] | None = None,
+        progress: Progress | None = None,
         preview: Callable[[Head], None] | None = None,
         preview_interval_s: float = 1.0,
     ) -> Head:
@@ -363,7 +382,7 @@ class HeadBuilder(NativeObject):
         return [HeadPhoto(tuple(p.box_px), p.head_coverage, bool(p.is_used), p.focal_px, p.rms_px) for p in found]
 
     @property
-    def stats(self) -> dict[str, float]:
+    def stats(self) -> dict[str, Any]:
         """Times and counts, of the photos so far and of the latest fit: the fields of maq_head_build_stats."""
         return native().stats("maq_head_build_stats", "maq_head_builder_get_stats", self.handle)
 
@@ -381,12 +400,18 @@ class HeadRenderer(NativeObject):
     """
 
     def __init__(
-        self, mesh: HeadMesh, shading: str = "colour", background: Sequence[int] | None = None, **settings: Any
+        self,
+        mesh: HeadMesh,
+        shading: HeadShading = "colour",
+        background: Sequence[int] | None = None,
+        **settings: Unpack[HeadRendererSettings],
     ) -> None:
         n = native()
+        own: dict[str, Any] = {"shading": shading, "image_pool_size": 4}
         if background is not None:
-            settings |= {"use_background": 1, "background": _numbers("background", background, "red, green, blue")}
-        config = n.config("maq_head_renderer_config", {"shading": _shading(shading), **settings})
+            own |= {"use_background": 1, "background": _numbers("background", background, "red, green, blue")}
+        config = n.config("maq_head_renderer_config", {**own, **settings})
+        self._lender = Lender(config.image_pool_size)
         super().__init__(n.create("maq_head_renderer", n.context, config, mesh.handle))
 
     def camera(
@@ -399,20 +424,15 @@ class HeadRenderer(NativeObject):
         n.call("maq_head_renderer_get_camera", self.handle, yaw_rad, pitch_rad, width_px, height_px, camera)
         return PinholeCamera.of_struct(camera)
 
-    def set_shading(self, shading: str) -> None:
+    def set_shading(self, shading: HeadShading) -> None:
         """Sets the shading of later images."""
-        native().call("maq_head_renderer_set_shading", self.handle, _shading(shading))
+        n = native()
+        n.call("maq_head_renderer_set_shading", self.handle, n.value_of("maq_head_shading", shading, "shading"))
 
     def run(self, camera: PinholeCamera) -> Image:
         """Renders the view of a camera, without distortion and outside of the head: `camera`, `Head.camera`, or another
         in the head's frame. One call at a time. Raises MaquetteError."""
-        return rendered(native(), self.handle, camera.to_struct(), "maq_head_renderer_run", of_head=True)
-
-
-def _shading(name: str) -> int:
-    if name not in SHADINGS:
-        raise ValueError(f'shading is "{name}"; it is one of {", ".join(SHADINGS)}')
-    return SHADINGS.index(name)
+        return rendered(self._lender, self.handle, camera.to_struct(), "maq_head_renderer_run", of_head=True)
 
 
 def _numbers(name: str, values: Sequence[float], meaning: str) -> list:

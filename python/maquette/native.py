@@ -5,14 +5,22 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
+import time
 import weakref
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from maquette.declarations import enum_names, read_headers
+
+if TYPE_CHECKING:
+    from typing import Self
+
 T = TypeVar("T")
+_WAIT_NS = 50_000_000  # Ctrl-C ends a wait within this time
 
 _FOLDER = Path(__file__).resolve().parent
 _IN_WHEEL = _FOLDER / "lib" / "libmaquette.so"
@@ -26,7 +34,10 @@ class MaquetteError(RuntimeError):
 
     def __init__(self, text: str, status: str) -> None:
         super().__init__(f"{text} ({status})")
-        self.status = status
+        self.text, self.status = text, status
+
+    def __reduce__(self) -> tuple[type[MaquetteError], tuple[str, str]]:  # a pool of processes pickles exceptions
+        return type(self), (self.text, self.status)
 
 
 def library_path() -> Path:
@@ -38,7 +49,7 @@ def library_path() -> Path:
 
 
 class Native:
-    """The opened library. ffi, lib: cffi's. context: the one context of this process."""
+    """The opened library. ffi, lib: cffi's."""
 
     def __init__(self, path: Path) -> None:
         if not path.exists():
@@ -47,8 +58,6 @@ class Native:
         try:
             from maquette._generated import ffi
         except ImportError:
-            from maquette.declarations import read_headers
-
             ffi = read_headers(_CHECKOUT / "sdk/include/maquette")
         for other in sorted(path.parent.glob("libturbojpeg.so*")):  # the wheel brings its own; found by its name then
             ctypes.CDLL(str(other), mode=ctypes.RTLD_GLOBAL)
@@ -56,11 +65,22 @@ class Native:
         self._texts: weakref.WeakKeyDictionary[Any, list[Any]] = weakref.WeakKeyDictionary()
         self.ffi: Any = ffi
         self.lib: Any = ffi.dlopen(str(path))
-        version = sum(v * f for v, f in zip(self._version(), (10000, 100, 1), strict=True))
-        self.context = self.create("maq_context", version, ffi.NULL)
+        self._context: Any = None
+        _ = self.context  # headers of another version are refused now
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self._forget_context)
 
-    def _version(self) -> tuple[int, int, int]:
-        return self.lib.MAQ_VERSION_MAJOR, self.lib.MAQ_VERSION_MINOR, self.lib.MAQ_VERSION_PATCH
+    @property
+    def context(self) -> Any:
+        """The one context of this process. A child of fork() makes its own, because a parent's is of no use there."""
+        if self._context is None:
+            lib = self.lib
+            version = lib.MAQ_VERSION_MAJOR * 10000 + lib.MAQ_VERSION_MINOR * 100 + lib.MAQ_VERSION_PATCH
+            self._context = self.create("maq_context", version, self.ffi.NULL)
+        return self._context
+
+    def _forget_context(self) -> None:
+        self._context = None
 
     def status_name(self, status: int) -> str:
         return self.ffi.string(self.lib.maq_status_get_name(status)).decode()
@@ -97,20 +117,42 @@ class Native:
         maq_model_options, if it has them, are settings too: threads, bundle_path, ..."""
         struct = self.ffi.new(f"{kind} *")
         self.call(f"{kind}_init", struct, self.ffi.sizeof(kind))
-        fields = {name: struct for name, _ in self.ffi.typeof(kind).fields}
+        fields = {name: (struct, field.type) for name, field in self.ffi.typeof(kind).fields}
         if fields.pop("model", None) is not None:
-            fields |= {name: struct.model for name, _ in self.ffi.typeof("maq_model_options").fields}
+            options = self.ffi.typeof("maq_model_options").fields
+            fields |= {name: (struct.model, field.type) for name, field in options}
         fields.pop("struct_size", None)
         kept = []
         for name, value in settings.items():
             if name not in fields:
                 raise TypeError(f"{kind} has no field {name}; it has {', '.join(sorted(fields))}")
-            if isinstance(value, (str, os.PathLike)):
+            owner, of_type = fields[name]
+            if of_type.kind == "enum" and isinstance(value, str):
+                value = self.value_of(of_type.cname, value, name)
+            elif of_type.kind == "pointer" and isinstance(value, (str, os.PathLike)):
                 value = self.ffi.new("char[]", os.fsencode(value))
                 kept.append(value)
-            setattr(fields[name], name, value)
+            try:
+                setattr(owner, name, value)
+            except (TypeError, OverflowError):
+                raise TypeError(f"{name} is {value!r}; in {kind} it is of type {of_type.cname}") from None
         self._texts[struct] = kept
         return struct
+
+    def names_of(self, kind: str) -> dict[str, int]:
+        """Values of an enum by short names: "off", "auto" and "all" of maq_densepose_crops."""
+        return enum_names(self.ffi.typeof(kind))
+
+    def value_of(self, kind: str, name: str, argument: str) -> int:
+        """The value of an enum by its short name. Raises ValueError with all names."""
+        names = self.names_of(kind)
+        if name not in names:
+            raise ValueError(f'{argument} is "{name}"; it is one of {", ".join(names)}')
+        return names[name]
+
+    def name_of(self, kind: str, value: int) -> str:
+        """The short name of a value of an enum."""
+        return next(name for name, known in self.names_of(kind).items() if known == value)
 
     def sized(self, kind: str) -> Any:
         """An empty struct with its struct_size, for the library to fill."""
@@ -118,11 +160,39 @@ class Native:
         struct.struct_size = self.ffi.sizeof(kind)
         return struct
 
-    def stats(self, kind: str, function: str, handle: Any) -> dict[str, float]:
-        """The fields of a stats struct by their names."""
+    def wait(self, function: str, handle: Any, kind: str, release: str, timeout_s: float | None) -> Any:
+        """The object that `function`, a maq_…_acquire_…, waits for; None when no more will come. It waits in slices,
+        between which Python sees Ctrl-C. Raises MaquetteError, TimeoutError."""
+        out = self.ffi.new(f"{kind} **")
+        end = None if timeout_s is None else time.monotonic_ns() + round(timeout_s * 1e9)
+        while True:
+            left = _WAIT_NS if end is None else max(0, min(_WAIT_NS, end - time.monotonic_ns()))
+            status = self.ask(function, handle, left, out)
+            if status != self.lib.MAQ_TIMEOUT:
+                break
+            if end is not None and time.monotonic_ns() >= end:
+                raise TimeoutError(f"nothing came within {timeout_s:g} s")
+        if status in (self.lib.MAQ_END_OF_STREAM, self.lib.MAQ_CANCELLED):
+            return None
+        if status:
+            self.fail(function, status)
+        return self.ffi.gc(out[0], getattr(self.lib, release))
+
+    def text(self, pointer: Any) -> str:
+        """A text of C; "" for NULL."""
+        return self.ffi.string(pointer).decode() if pointer else ""
+
+    def stats(self, kind: str, function: str, handle: Any) -> dict[str, Any]:
+        """The fields of a stats struct by their names; enums by the names of their values."""
         struct = self.sized(kind)
         self.call(function, handle, struct)
-        return {name: getattr(struct, name) for name, _ in self.ffi.typeof(kind).fields if name != "struct_size"}
+        return {
+            name: self.name_of(field.type.cname, getattr(struct, name))
+            if field.type.kind == "enum"
+            else getattr(struct, name)
+            for name, field in self.ffi.typeof(kind).fields
+            if name != "struct_size"
+        }
 
     def plane(self, function: str, handle: Any, plane: int, shape: tuple[int, ...], kind: type) -> np.ndarray:
         """A copy of a plane of a result, of the shape [H, W] or [H, W, C]."""
@@ -161,11 +231,61 @@ class NativeObject:
             native().ffi.release(self._handle)
             self._handle = None
 
+    def __repr__(self) -> str:
+        if self._handle is None:
+            return f"<{type(self).__name__}, closed>"
+        about = self._about()
+        return f"<{type(self).__name__} {about}>" if about else f"<{type(self).__name__}>"
+
+    def _about(self) -> str:
+        """Some words for `repr` of an open object."""
+        return ""
+
+    def __reduce__(self) -> Any:
+        raise TypeError(f"{type(self).__name__} is an object of the library, and cannot be pickled or copied.")
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class LentResult(NativeObject):
+    """The library's result behind one of Python, as long as the library can spare it."""
+
+    @property
+    def handle(self) -> Any:
+        if self._handle is None:
+            problem = (
+                "This result has only its arrays left: it was copied, or the model has made many newer results since. "
+                "Call the method sooner, or raise the number of results that the model lends."
+            )
+            raise MaquetteError(problem, "MAQ_ERROR_POOL_EMPTY")
+        return self._handle
+
+    def __reduce__(self) -> tuple[type[LentResult], tuple[None]]:  # a copy, or in another process, has arrays alone
+        return LentResult, (None,)
+
+
+class Lender:
+    """Results that a model lends, at most `count`: before one more is made, the oldest goes back to the pool."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count or 4  # 0: the library's default
+        self._lent: deque[weakref.ref[LentResult]] = deque()
+
+    def make_room(self) -> None:
+        self._lent = deque(ref for ref in self._lent if (lent := ref()) is not None and lent._handle is not None)
+        while len(self._lent) >= self._count:
+            oldest = self._lent.popleft()()
+            if oldest is not None:
+                oldest.close()
+
+    def lend(self, handle: Any) -> LentResult:
+        lent = LentResult(handle)
+        self._lent.append(weakref.ref(lent))
+        return lent
 
 
 @functools.cache

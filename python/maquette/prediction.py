@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.frames import Frame, Source, acquired_frame
+from maquette.frames import Frame, ImageLike, acquired_frame
 from maquette.native import NativeObject, native
+from maquette.sources import Source
 
-METHODS = ("auto", "last", "motion", "refined", "sampled")  # in the order of maq_predictor_method
-NOVELTY_METHODS = ("auto", "bigram")  # in the order of maq_novelty_method
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from maquette.settings import ConcealerSettings, NoveltyMethod, NoveltySettings, PredictorMethod, PredictorSettings
 
 
 class Predictor(NativeObject):
@@ -26,13 +29,18 @@ class Predictor(NativeObject):
     them.
     """
 
-    def __init__(self, method: str = "auto", shared_with: Predictor | None = None, **settings: Any) -> None:
+    def __init__(
+        self,
+        method: PredictorMethod = "auto",
+        shared_with: Predictor | None = None,
+        **settings: Unpack[PredictorSettings],
+    ) -> None:
         n = native()
         shared = {} if shared_with is None else {"shared_with": shared_with.handle}
-        config = n.config("maq_predictor_config", {"method": _method(method)} | shared | settings)
+        config = n.config("maq_predictor_config", {"method": method, **shared, **settings})
         super().__init__(n.create("maq_predictor", n.context, config))
 
-    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> None:
+    def push(self, image: ImageLike, time_s: float | None = None) -> None:
         """Adds the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
         seconds, counted from any moment. Earlier frames are forgotten at a cut, another size or a pause of a second.
         Raises MaquetteError."""
@@ -82,9 +90,9 @@ class Predictor(NativeObject):
         native().call("maq_predictor_reset", self.handle)
 
     @property
-    def stats(self) -> dict[str, float]:
-        """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method` is
-        an index into METHODS: the method that made the latest prediction."""
+    def stats(self) -> dict[str, Any]:
+        """Milliseconds of the latest push and prediction, and counts: the fields of maq_predictor_stats. `method`
+        made the latest prediction."""
         return native().stats("maq_predictor_stats", "maq_predictor_get_stats", self.handle)
 
 
@@ -105,6 +113,16 @@ class NoveltyScore:
     is_stream_start: bool
     map: np.ndarray
 
+    def __repr__(self) -> str:
+        marks = "".join(f", {m}" for m in ("event", "cut", "stream_start") if getattr(self, f"is_{m}"))
+        return f"<NoveltyScore {self.bits:.3f} bits, ratio {self.ratio:.2f}{marks}>"
+
+
+def novelty_score(score: Any, cells: np.ndarray) -> NoveltyScore:
+    """Copies a maq_novelty_score."""
+    flags = bool(score.is_event), bool(score.is_cut), bool(score.is_stream_start)
+    return NoveltyScore(score.bits, score.ratio, *flags, cells)
+
 
 class Novelty(NativeObject):
     """Scores how unexpected each frame of a stream is after the frames before, and where, in bits.
@@ -114,14 +132,15 @@ class Novelty(NativeObject):
     their names, such as event_ratio=6. Raises MaquetteError.
     """
 
-    def __init__(self, shared_with: Novelty | None = None, method: str = "auto", **settings: Any) -> None:
+    def __init__(
+        self, shared_with: Novelty | None = None, method: NoveltyMethod = "auto", **settings: Unpack[NoveltySettings]
+    ) -> None:
         n = native()
-        own = {"method": _method(method, NOVELTY_METHODS)}
         shared = {} if shared_with is None else {"shared_with": shared_with.handle}
-        config = n.config("maq_novelty_config", own | shared | settings)
+        config = n.config("maq_novelty_config", {"method": method, **shared, **settings})
         super().__init__(n.create("maq_novelty", n.context, config))
 
-    def push(self, image: Frame | np.ndarray, time_s: float | None = None) -> NoveltyScore:
+    def push(self, image: ImageLike, time_s: float | None = None) -> NoveltyScore:
         """Scores the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
         seconds. Raises MaquetteError."""
         n = native()
@@ -129,8 +148,7 @@ class Novelty(NativeObject):
         n.call("maq_novelty_push", self.handle, _timed_frame(image, time_s).handle, score)
         cells = np.empty((score.rows, score.columns), np.float32)
         n.call("maq_novelty_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
-        flags = (bool(score.is_event), bool(score.is_cut), bool(score.is_stream_start))
-        return NoveltyScore(score.bits, score.ratio, *flags, cells)
+        return novelty_score(score, cells)
 
     def reset(self) -> None:
         """Forgets the frames so far, to begin another stream."""
@@ -145,7 +163,7 @@ class Novelty(NativeObject):
         return Frame.of_handle(frame)
 
     @property
-    def stats(self) -> dict[str, float]:
+    def stats(self) -> dict[str, Any]:
         """Milliseconds of the latest frame, and counts: the fields of maq_novelty_stats."""
         return native().stats("maq_novelty_stats", "maq_novelty_get_stats", self.handle)
 
@@ -159,10 +177,16 @@ class Concealer(NativeObject):
     their names. Raises MaquetteError for a source that is not live.
     """
 
-    def __init__(self, source: Source, max_gap_s: float = 0.3, method: str = "auto", **settings: Any) -> None:
+    def __init__(
+        self,
+        source: Source,
+        max_gap_s: float = 0.3,
+        method: PredictorMethod = "auto",
+        **settings: Unpack[ConcealerSettings],
+    ) -> None:
         n = native()
-        own = {"max_gap_ms": round(max_gap_s * 1000), "method": _method(method)}
-        config = n.config("maq_concealer_config", own | settings)
+        own = {"max_gap_ms": round(max_gap_s * 1000), "method": method}
+        config = n.config("maq_concealer_config", {**own, **settings})
         super().__init__(n.create("maq_concealer", n.context, source.handle, config))
         self._source = source  # keeps it open
 
@@ -175,19 +199,13 @@ class Concealer(NativeObject):
             yield frame
 
     @property
-    def stats(self) -> dict[str, float]:
+    def stats(self) -> dict[str, Any]:
         """Counts of captured, predicted, late and dropped frames, and waiting times: the fields of
         maq_concealer_stats."""
         return native().stats("maq_concealer_stats", "maq_concealer_get_stats", self.handle)
 
 
-def _method(name: str, methods: tuple[str, ...] = METHODS) -> int:
-    if name not in methods:
-        raise ValueError(f"no method {name!r}; there are {', '.join(methods)}")
-    return methods.index(name)
-
-
-def _timed_frame(image: Frame | np.ndarray, time_s: float | None) -> Frame:
+def _timed_frame(image: ImageLike, time_s: float | None) -> Frame:
     if isinstance(image, Frame) == (time_s is not None):
         raise ValueError("time_s is the time of an array, and needed; frames have their own")
     return image if isinstance(image, Frame) else Frame(image, timestamp_ns=round((time_s or 0) * 1e9))

@@ -9,6 +9,7 @@ file(REMOVE_RECURSE "${WORK_DIR}")
 file(MAKE_DIRECTORY "${WORK_DIR}/home" "${WORK_DIR}/tree/build")
 file(CREATE_LINK "${BUILD_DIR}" "${WORK_DIR}/tree/build/release" SYMBOLIC)
 file(CREATE_LINK "${SOURCE_DIR}/tests" "${WORK_DIR}/tree/tests" SYMBOLIC)
+file(CREATE_LINK "${SOURCE_DIR}/examples" "${WORK_DIR}/tree/examples" SYMBOLIC)
 file(WRITE "${WORK_DIR}/commands.sh" "${commands}")
 # What the reader's terminal does not have either.
 set(unset --unset=LD_LIBRARY_PATH --unset=LD_RUN_PATH)

@@ -172,6 +172,14 @@ MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* re
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, maq_densepose_stats* stats);
 
+/* The colours of body parts in drawings. Values never change meaning; new ones are added at the end. */
+typedef enum maq_densepose_colours {
+  MAQ_DENSEPOSE_COLOURS_DEFAULT = 0,     /* the SDK's colours (maq_densepose_get_part_colour) */
+  MAQ_DENSEPOSE_COLOURS_DETECTRON2 = 1,  /* detectron2's "dp_segm": Parula. ControlNet models expect them opaque on
+                                            black. */
+  MAQ_DENSEPOSE_COLOURS_MAGICANIMATE = 2 /* the same with Viridis. MagicAnimate expects them opaque on (68, 1, 84). */
+} maq_densepose_colours;
+
 /* For maq_densepose_drawing.opacity: the colours are not drawn. */
 #define MAQ_DENSEPOSE_INVISIBLE (-1)
 
@@ -180,11 +188,12 @@ typedef struct maq_densepose_drawing {
   uint32_t struct_size;
   int32_t x_px; /* top left corner of the drawn part of the frame; 0 (default): the frame's corner */
   int32_t y_px;
-  int32_t width_px;    /* 0 (default): up to the frame's right edge */
-  int32_t height_px;   /* 0 (default): down to the frame's lower edge */
-  int32_t opacity;     /* opacity of the colours, 1 to 255 (they cover the frame); 0 (default): 180; or
-                            MAQ_DENSEPOSE_INVISIBLE */
-  int32_t is_mirrored; /* 1: left and right are exchanged, as in a mirror; default 0 */
+  int32_t width_px;              /* 0 (default): up to the frame's right edge */
+  int32_t height_px;             /* 0 (default): down to the frame's lower edge */
+  int32_t opacity;               /* opacity of the colours, 1 to 255 (they cover the frame); 0 (default): 180; or
+                                      MAQ_DENSEPOSE_INVISIBLE */
+  int32_t is_mirrored;           /* 1: left and right are exchanged, as in a mirror; default 0 */
+  maq_densepose_colours colours; /* default MAQ_DENSEPOSE_COLOURS_DEFAULT */
 } maq_densepose_drawing;
 
 /* Fills `drawing` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_drawing) of the caller.
@@ -192,7 +201,7 @@ typedef struct maq_densepose_drawing {
 MAQ_API maq_status maq_densepose_drawing_init(maq_densepose_drawing* drawing, uint32_t struct_size);
 
 /* Draws the people over their frame into memory of the app, for a preview or a window. Each of their pixels is blended
- * with the colour of its part (maq_densepose_get_part_colour). `frame` is the frame of the result. If it is NULL, the
+ * with the colour of its part (drawing->colours). `frame` is the frame of the result. If it is NULL, the
  * colours are drawn on transparent ground, multiplied by their opacity. `rgba` gets height_px rows of `stride_bytes`
  * bytes (0: rows without padding), 4 bytes a pixel; it has `size_bytes` bytes. `drawing` may be NULL for the defaults.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory, a part that is not inside the frame, a frame of

@@ -10,8 +10,8 @@ thread_local std::string returned_error;
 }  // namespace
 
 const char kIsOfParent[] =
-    "The object was made before fork(), by the parent process. Make a context and all that is made from it anew in "
-    "the child.";
+    "The object was made before fork(), by the parent process. Create it anew in the child, from a context of the "
+    "child.";
 
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept {
   try {

@@ -12,6 +12,20 @@ namespace {
 
 constexpr int kBandRows = 16;  // even; converted at once, in the cache
 
+// The colours of OpenCV's COLORMAP_PARULA and COLORMAP_VIRIDIS at part * 255 / 24.
+constexpr std::array<std::array<uint8_t, 3>, 25> kParulaParts = {{
+    {0, 0, 0},       {37, 60, 163},   {20, 80, 194},   {4, 97, 223},   {8, 110, 221},  {14, 122, 216}, {20, 132, 212},
+    {15, 144, 208},  {11, 156, 203},  {6, 166, 198},   {22, 173, 185}, {38, 179, 172}, {55, 185, 159}, {86, 187, 144},
+    {114, 189, 130}, {145, 191, 116}, {170, 189, 105}, {192, 188, 96}, {216, 186, 86}, {228, 192, 74}, {240, 199, 60},
+    {252, 206, 46},  {251, 220, 36},  {250, 235, 25},  {249, 251, 14},
+}};
+constexpr std::array<std::array<uint8_t, 3>, 25> kViridisParts = {{
+    {68, 1, 84},    {71, 16, 99},   {72, 31, 112},  {71, 44, 122},  {68, 57, 131},  {64, 70, 136},  {59, 81, 139},
+    {54, 93, 141},  {49, 104, 142}, {44, 113, 142}, {40, 124, 142}, {37, 133, 142}, {33, 144, 141}, {31, 154, 138},
+    {32, 163, 134}, {39, 173, 129}, {53, 183, 121}, {70, 192, 111}, {92, 200, 99},  {115, 208, 86}, {142, 214, 69},
+    {170, 220, 50}, {197, 224, 33}, {226, 228, 24}, {253, 231, 37},
+}};
+
 // Colour of a part: the value it adds to a channel, and the weight of the frame, both times 255.
 struct Paint {
   std::array<int, 3> rgb;
@@ -20,11 +34,13 @@ struct Paint {
 };
 using Palette = std::array<Paint, kBodyParts.size()>;
 
-Palette palette_of(int opacity, bool has_frame) {
+Palette palette_of(const Painting& painting, bool has_frame) {
   Palette palette;
   for (size_t part = 0; part < palette.size(); ++part) {
-    const int covers = part == 0 ? 0 : opacity;
-    const auto& rgb = kBodyParts[part].rgb;
+    const int covers = part == 0 ? 0 : painting.opacity;
+    const auto& rgb = painting.colours == PartColours::kDetectron2     ? kParulaParts[part]
+                      : painting.colours == PartColours::kMagicAnimate ? kViridisParts[part]
+                                                                       : kBodyParts[part].rgb;
     palette[part] = {
         {rgb[0] * covers, rgb[1] * covers, rgb[2] * covers}, 255 - covers, uint8_t(has_frame ? 255 : covers)};
   }
@@ -53,7 +69,7 @@ void paint_row(const Palette& palette, const uint8_t* parts, const uint8_t* bgr,
 
 void paint_people(const DensePlanes& planes, const ImageView* frame, const Painting& painting, uint8_t* rgba,
                   size_t stride_bytes) {
-  const Palette palette = palette_of(painting.opacity, frame != nullptr);
+  const Palette palette = palette_of(painting, frame != nullptr);
   const int step = painting.is_mirrored ? -4 : 4;
   uint8_t* const first = rgba + (painting.is_mirrored ? 4 * (ptrdiff_t(painting.width_px) - 1) : 0);
   const int end = painting.y_px + painting.height_px;

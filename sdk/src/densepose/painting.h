@@ -9,11 +9,14 @@
 
 namespace maq {
 
+enum class PartColours { kDefault, kDetectron2, kMagicAnimate };  // see maq_densepose_colours
+
 // As maq_densepose_drawing; the part of the frame is within it and has at least one pixel.
 struct Painting {
   int x_px = 0, y_px = 0, width_px = 0, height_px = 0;
   int opacity = 255;
   bool is_mirrored = false;
+  PartColours colours = PartColours::kDefault;
 };
 
 // Writes height_px rows of width_px RGBA pixels. `frame` has the size of `planes`, or is null: the background is

@@ -27,6 +27,7 @@ struct DensePoseOptions {
   ModelOptions model;
   std::string out;
   bool overlay = false;
+  std::string colours = "default";
   bool json = false;
   double roll_deg = 0;
   FrameLimits limits;
@@ -112,7 +113,13 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
     const maquette::DensePoseResult result = densepose.run(given.frame);
     const maq_densepose_stats stats = result.stats();
     // Drawn before the first file is written, so that a frame has all its files or none.
-    cv::Mat overlay = options.overlay ? draw_overlay(image_of(given.frame), result) : cv::Mat();
+    cv::Mat overlay;
+    if (options.overlay && options.colours == "default") {
+      overlay = draw_overlay(image_of(given.frame), result);
+    } else if (options.overlay) {
+      overlay = draw_parts(result, options.colours == "detectron2" ? MAQ_DENSEPOSE_COLOURS_DETECTRON2
+                                                                   : MAQ_DENSEPOSE_COLOURS_MAGICANIMATE);
+    }
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
     make_folder_of(fs::path(options.out) / (given.stem + "_IUV.png"));
     result.save((fs::path(options.out) / given.stem).string());
@@ -165,6 +172,12 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
+  command
+      ->add_option(
+          "--colours", options->colours,
+          "Colours of --overlay: default, detectron2 (for ControlNet) or magicanimate. The latter two show the "
+          "parts alone, on the ground that these models expect")
+      ->check(CLI::IsMember({"default", "detectron2", "magicanimate"}));
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_model_options(*command, options->model);
   command

@@ -184,3 +184,18 @@ cv::Mat draw_overlay(const cv::Mat& image, const maquette::DensePoseResult& resu
   for (size_t k = people.size(); k-- > 0;) draw_box(people[k], scale, canvas);
   return canvas;
 }
+
+cv::Mat draw_parts(const maquette::DensePoseResult& result, maq_densepose_colours colours) {
+  maq_densepose_drawing drawing{};
+  maquette::check(maq_densepose_drawing_init(&drawing, sizeof drawing));
+  drawing.opacity = 255;
+  drawing.colours = colours;
+  cv::Mat rgba(result.height_px(), result.width_px(), CV_8UC4), bgr;
+  result.draw(nullptr, drawing, rgba.data, 0, rgba.total() * rgba.elemSize());
+  cv::Mat is_ground;
+  cv::extractChannel(rgba, is_ground, 3);
+  is_ground = is_ground == 0;
+  cv::cvtColor(rgba, bgr, cv::COLOR_RGBA2BGR);
+  if (colours == MAQ_DENSEPOSE_COLOURS_MAGICANIMATE) bgr.setTo(cv::Scalar(84, 1, 68), is_ground);
+  return bgr;
+}

@@ -60,6 +60,28 @@ def test_painted_changes_the_pixels_of_people_alone(densepose, person):
     assert np.array_equal(painted[result.part > 0], maquette.part_colours()[result.part[result.part > 0]])
 
 
+def test_results_are_drawn_and_saved_as_the_command_line_does(person, tmp_path):
+    densepose = maquette.DensePose(threads=1, result_pool_size=2)
+    result = densepose.run(person)
+    result.save(tmp_path / "person")
+    stored = maquette.Frame.open(tmp_path / "person_IUV.png").pixels(maquette.PixelFormat.BGR8)
+    assert np.array_equal(stored, result.iuv)
+    assert (tmp_path / "person_INDS.png").exists()
+    assert str(result) == "<DensePoseResult 320 x 240, 1 person>"
+    assert result.people[0].id is None
+
+    body = result.part > 0
+    over, alone = result.draw(person, opacity=255), result.draw(opacity=100)
+    assert np.array_equal(over[body, :3], maquette.part_colours()[result.part[body]])
+    assert np.array_equal(over[~body, :3], person.pixels()[~body])
+    assert np.array_equal(alone[..., 3], np.where(body, 100, 0))
+    assert np.array_equal(result.draw(opacity=100, is_mirrored=True), alone[:, ::-1])
+    newer = [densepose.run(person) for _ in range(3)]
+    newer[-1].draw()
+    with pytest.raises(maquette.MaquetteError, match="many newer results"):
+        result.draw()
+
+
 def test_names_and_surface_of_the_parts(densepose):
     assert maquette.part_name(0) == "background"
     assert maquette.part_name(25) == "unknown part"
@@ -90,6 +112,10 @@ def test_a_box_is_measured_saved_and_snapped_to(box, tmp_path):
     assert target == "corner"
     assert point == pytest.approx(corner)
     assert result.curves.snap(-500, -500, 1) is None
+    assert str(measured).startswith("<Box ")
+    assert result.curves.snap_to_ray((0, 0, 0), corner)[0] == "corner"
+    result.save(tmp_path / "box")
+    assert (tmp_path / "box_distance.png").exists()
     result.curves.save(tmp_path / "box.dxf")
     assert (tmp_path / "box.dxf").stat().st_size > 100
 
@@ -184,6 +210,22 @@ def test_a_scene_is_built_saved_and_rendered(tmp_path):
     height, width = camera.intrinsics.height_px, camera.intrinsics.width_px
     assert image.rgb.shape == (height, width, 3)
     assert image.depth[image.alpha == 255].min() > 0
+    image.save(tmp_path / "view.png", alpha=True)
+    assert np.array_equal(maquette.Frame.open(tmp_path / "view.png").pixels()[image.alpha == 255],
+                          image.rgb[image.alpha == 255])  # fmt: skip
+    assert maquette.Scene.open((tmp_path / "place.maqs").read_bytes()).point_count == opened.point_count
+
+    capture = maquette.Capture(folder)
+    builder = maquette.SceneBuilder(_wall_points(), up=capture.up, threads=1)
+    seen = [builder.add_view(capture.photo(k), view.camera) for k, view in enumerate(capture.views)]
+    assert min(seen) > 0
+    assert builder.stats["view_count"] == 2
+    assert builder.finish().point_count == scene.point_count
+    builder.cancel()
+    with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
+        builder.add_view(capture.photo(0), camera)
+    with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_NOT_FOUND"):
+        capture.depth(0)
     with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
         maquette.Scene.build(folder, progress=lambda done, stage: False)
     with pytest.raises(ZeroDivisionError):
@@ -207,8 +249,7 @@ def test_a_camera_that_looks_at_a_point_sees_it_in_the_middle():
         (lambda: maquette.DensePose("nowhere"), maquette.MaquetteError, "nowhere.*MAQ_ERROR_NOT_FOUND"),
         (lambda: maquette.DensePose(long_side=288), TypeError, "no field long_side; it has .*long_side_px"),
         (lambda: maquette.DensePose(long_side_px=-4), maquette.MaquetteError, "long_side_px"),
-        (lambda: maquette.Frame(np.zeros((4, 4, 2), np.uint8)), ValueError, r"RGB8 is uint8 \[H, W, 3\]"),
-        (lambda: maquette.Frame(np.zeros((4, 4, 3), np.float64)), ValueError, "not float64"),
+        (lambda: maquette.Frame(np.zeros((4, 4)), maquette.PixelFormat.BGR8), ValueError, r"BGR8 is uint8 \[H, W, 3\]"),
         (lambda: maquette.Frame(np.zeros((0, 4, 3), np.uint8)), maquette.MaquetteError, "MAQ_ERROR_"),
         (lambda: maquette.Frame.decode(b"no picture"), maquette.MaquetteError, "MAQ_ERROR_UNREADABLE"),
         (lambda: maquette.Source("nothing:"), maquette.MaquetteError, "MAQ_ERROR_UNSUPPORTED"),
@@ -246,6 +287,12 @@ def test_depth_is_wanted_for_edges(person):
         maquette.Edges(threads=1).run(person)
 
 
+def _wall_points():
+    return np.stack([*np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60)), np.zeros((60, 60))], -1).reshape(
+        -1, 3
+    )
+
+
 def _small_capture(folder):
     """A wall of coloured points before two cameras, as transforms.json."""
     import json
@@ -263,11 +310,10 @@ def _small_capture(folder):
         pose = np.eye(4)
         pose[:3, 3] = shift, 0, 2
         frames.append({"file_path": f"{k}.png", "transform_matrix": pose.tolist()})
-    points = np.stack([*np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60)), np.zeros((60, 60))], -1)
     header = (
         "ply\nformat ascii 1.0\nelement vertex 3600\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     )
-    rows = "\n".join(" ".join(f"{v:.4f}" for v in point) for point in points.reshape(-1, 3))
+    rows = "\n".join(" ".join(f"{v:.4f}" for v in point) for point in _wall_points())
     (place / "points.ply").write_text(header + rows + "\n")
     camera = {"w": size, "h": size, "fl_x": 100, "fl_y": 100, "cx": size / 2, "cy": size / 2}
     about = {**camera, "ply_file_path": "points.ply", "frames": frames}

@@ -19,7 +19,7 @@ UNBOUND = tomllib.loads(Path(__file__).with_name("unbound_functions.toml").read_
 BY_TYPE = {
     "cpp": re.compile(r"_(create|destroy|release|close|config_init)$"),
     "kotlin": re.compile(r"_init$"),
-    "python": re.compile(r"_(create|destroy|release|close|config_init)$"),
+    "python": re.compile(r"_(create|destroy|release|close|config_init|init)$"),
 }
 
 

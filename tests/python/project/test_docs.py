@@ -12,7 +12,7 @@ PAGES = [
     *GUIDES,
     *sorted(Path("docs/reference").rglob("*.md")),
 ]
-FOLDERS = "android|benchmarks|cmake|desktop_demo|docs|export|python|quantization|scripts|sdk|tests"
+FOLDERS = "android|benchmarks|cmake|desktop_demo|docs|examples|export|python|quantization|scripts|sdk|tests"
 HEADERS = "".join(path.read_text() for path in sorted(Path("sdk/include/maquette").glob("*.h*")))
 SYMBOLS = set(re.findall(r"\bmaq_\w+|\bMAQ_\w+", HEADERS))
 TRACKED = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=True).stdout.splitlines()
@@ -56,7 +56,11 @@ def wrong(page: Path, names: re.Pattern, is_there) -> list[str]:
 
 def module_exists(match: re.Match) -> bool:
     path = Path(match[1].replace(".", "/"))
-    return path.with_suffix(".py").is_file() or (path / "__main__.py").is_file() or match[1] in ("pytest", "pip")
+    return (
+        path.with_suffix(".py").is_file()
+        or (path / "__main__.py").is_file()
+        or match[1] in ("pytest", "pip", "maquette")
+    )
 
 
 def file_exists(match: re.Match) -> bool:

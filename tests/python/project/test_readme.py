@@ -7,7 +7,7 @@ README = Path("README.md").read_text()
 
 
 def test_the_c_program_is_the_one_that_the_native_tests_build_against_an_installed_sdk():
-    program = Path("tests/consumers/people.c").read_text()
+    program = Path("examples/c/people.c").read_text()
     assert f"```c\n{program}```" in Path("docs/guide/link.md").read_text()
     assert len(program.splitlines()) <= 30
 

@@ -264,10 +264,12 @@ maq_status maq_densepose_result_draw(const maq_densepose_result* result, const m
     require_range("drawing.opacity", drawing.opacity, MAQ_DENSEPOSE_INVISIBLE, 255);
     const int opacity = drawing.opacity == 0 ? kDefaultOpacity : std::max(drawing.opacity, 0);
     require_range("drawing.is_mirrored", drawing.is_mirrored, 0, 1);
+    require_range("drawing.colours", int(drawing.colours), 0, int(MAQ_DENSEPOSE_COLOURS_MAGICANIMATE));
     const size_t stride =
         checked_stride(MAQ_PIXEL_RGBA8, drawing.width_px, drawing.height_px, stride_bytes, size_bytes);
     paint_people(planes, image,
-                 {drawing.x_px, drawing.y_px, drawing.width_px, drawing.height_px, opacity, drawing.is_mirrored == 1},
+                 {drawing.x_px, drawing.y_px, drawing.width_px, drawing.height_px, opacity, drawing.is_mirrored == 1,
+                  PartColours(drawing.colours)},
                  rgba, stride);
     return MAQ_OK;
   });

@@ -3,6 +3,7 @@ package dev.maquette
 import android.Manifest.permission.CAMERA
 import android.app.Activity
 import android.view.ViewGroup
+import dev.maquette.examples.LiveOverlay
 import java.io.File
 import org.junit.Assert.assertEquals
 import org.junit.Assert.assertTrue
@@ -58,7 +59,7 @@ class LiveOverlayTest : AndroidTest() {
     @Test
     fun itIsWhatTheDocumentationShowsInTwentyLines() {
         val root = File(System.getProperty("maquette.root")!!)
-        val source = File(root, "tests/android/src/test/kotlin/dev/maquette/LiveOverlay.kt").readText()
+        val source = File(root, "examples/kotlin/LiveOverlay.kt").readText()
         val body = "open class LiveOverlay" + source.substringAfter("open class LiveOverlay").trimEnd()
         assertTrue("${body.lines().size} lines", body.lines().size <= 20)
         val lines = body.lines().joinToString("\n") { if (it.isEmpty()) it else "    $it" }

@@ -1,11 +1,14 @@
-package dev.maquette
+package dev.maquette.examples
 
 import android.Manifest.permission.CAMERA
 import android.app.Activity
 import android.content.pm.PackageManager.PERMISSION_GRANTED
 import android.os.Bundle
+import dev.maquette.LiveView
+import dev.maquette.Maquette
+import dev.maquette.ModelBundle
 
-/** The activity of docs/guide/android.md, as it stands there; [LiveOverlayTest] runs it. */
+/** The activity of docs/guide/android.md, as it stands there; LiveOverlayTest runs it. */
 open class LiveOverlay : Activity() {
     open val camera get() = "android:back?display=${windowManager.defaultDisplay.rotation * 90}"
     open val networks get() = ModelBundle.ofAssets(assets, "densepose-b-int8")

@@ -1,0 +1,35 @@
+"""`python -m maquette`: the command line of the SDK, `maquette`."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from maquette.native import library_path
+
+
+def program() -> Path | None:
+    """The program beside the library, in the folder of an installation, a wheel or a checkout's build."""
+    name = "maquette.exe" if os.name == "nt" else "maquette"
+    library = library_path()
+    places = (library.parent.parent / "bin" / name, library.parent / name)
+    return next((place for place in places if place.exists()), None)
+
+
+def main() -> int:
+    found = program()
+    if found is None:
+        print(
+            f"maquette: the command line is not beside {library_path()}. Build the SDK (make build).", file=sys.stderr
+        )
+        return 1
+    arguments = [str(found), *sys.argv[1:]]
+    if os.name == "nt":
+        return subprocess.run(arguments, check=False).returncode
+    os.execv(found, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -157,6 +157,7 @@ TEST_F(ApiDrawing, WhatCannotBeDrawnIsASentence) {
   expect_refused(kOutside, [](auto& drawing) { drawing.x_px = drawing.width_px = INT32_MAX; });
   expect_refused("drawing.opacity is 256", [](auto& drawing) { drawing.opacity = 256; });
   expect_refused("drawing.is_mirrored is 2", [](auto& drawing) { drawing.is_mirrored = 2; });
+  expect_refused("drawing.colours is 3", [](auto& drawing) { drawing.colours = maq_densepose_colours(3); });
   expect_refused("drawing.struct_size", [](auto& drawing) { drawing.struct_size = 4; });
   EXPECT_EQ(maq_densepose_result_draw(result_.get(), nullptr, nullptr, nullptr, 0, kAll), MAQ_ERROR_INVALID_ARGUMENT);
 }

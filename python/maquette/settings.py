@@ -189,7 +189,7 @@ class SceneBuildSettings(ModelSettings, total=False):
     """Larger photos are scaled down to this long side. 0: 640; MAQ_SCENE_LONG_SIDE_FULL: never."""
 
     coefficient_bits: int
-    """Of each number of a descriptor: 8, 16, or 32 (floats, then also positions). 0: 8."""
+    """Size of a descriptor's numbers: 8, 16, or 32 (floats, then also positions). 0: 8."""
 
     min_variation: float
     """Fraction of a photo's resolution at which visibility is tested, 1/16 to 1. A smaller fraction lets each point

@@ -40,7 +40,7 @@ typedef struct maq_scene_build_config {
   maq_model_options model; /* the networks. The bundle has the task "scenes"; the installed one is
                               share/maquette/models/scenes-int8. MAQ_THREADS_MEASURED is not supported. */
   int32_t long_side_px; /* larger photos are scaled down to this long side. 0: 640; MAQ_SCENE_LONG_SIDE_FULL: never */
-  int32_t coefficient_bits; /* of each number of a descriptor: 8, 16, or 32 (floats, then also positions). 0: 8 */
+  int32_t coefficient_bits; /* size of a descriptor's numbers: 8, 16, or 32 (floats, then also positions). 0: 8 */
   /* Points with descriptors that vary less than this between photos are stored without view dependence. Unit: RMS,
    * for colours of 0 to 1; a larger value makes a smaller file. 0: 0.05, or with 8 bits the value at which half of the
    * points are view-dependent, if that is larger. MAQ_SCENE_VARIATION_ALL: all points are view-dependent. */

@@ -38,7 +38,7 @@ def test_settings_are_the_headers():
 
 
 def checked(program: str, folder: Path) -> list[str]:
-    """What mypy says about a program of a user."""
+    """Returns the lines of mypy about a program of a user."""
     path = folder / "program.py"
     path.write_text(program)
     run = subprocess.run(

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from cffi import FFI
+from cffi import FFI  # type: ignore[import-untyped]
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _FOR_CPLUSPLUS = re.compile(r"^#ifdef __cplusplus$.*?^#endif$", re.DOTALL | re.MULTILINE)
@@ -21,7 +21,7 @@ _DIRECTIVE = re.compile(r"^#.*$", re.MULTILINE)
 def declarations(headers: Path) -> str:
     """Returns declarations for cffi's `cdef`, from the folder of maquette.h. Constants become enumerators, because
     `cdef` reads no expressions in a #define."""
-    parts = []
+    parts: list[str] = []
     features = (headers / "features.h").read_text()
     umbrella = (headers / "maquette.h").read_text()
     for feature in re.findall(r"^#define (MAQ_HAS_\w+) 0$", features, re.MULTILINE):  # its headers are not installed

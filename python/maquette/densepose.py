@@ -153,15 +153,15 @@ def densepose_result(result: Any, lent: LentResult) -> DensePoseResult:
         Person(tuple(p.box_px), p.score, _head_box_px(result, index), None if p.id == n.lib.MAQ_NO_ID else p.id)
         for index, p in enumerate(found)
     ]
-    planes = [
+    part, u, v, person = (
         n.plane("maq_densepose_result_get_plane", result, plane, shape, np.uint8)
         for plane in (
             n.lib.MAQ_DENSEPOSE_PLANE_PART, n.lib.MAQ_DENSEPOSE_PLANE_U, n.lib.MAQ_DENSEPOSE_PLANE_V,
             n.lib.MAQ_DENSEPOSE_PLANE_PERSON,
         )
-    ]  # fmt: skip
+    )  # fmt: skip
     stats = n.stats("maq_densepose_stats", "maq_densepose_result_get_stats", result)
-    return DensePoseResult(people, *planes, stats, lent)
+    return DensePoseResult(people, part, u, v, person, stats, lent)
 
 
 def surface_points(function: str, handle: Any) -> np.ndarray:
@@ -174,7 +174,7 @@ def surface_points(function: str, handle: Any) -> np.ndarray:
     return np.frombuffer(data, np.float32).reshape(shape).copy()
 
 
-def _head_box_px(result: Any, index: int) -> tuple[float, ...] | None:
+def _head_box_px(result: Any, index: int) -> tuple[float, float, float, float] | None:
     n = native()
     box_px = n.ffi.new("float[4]")
     status = n.ask("maq_densepose_result_get_head_box", result, index, box_px)
@@ -182,7 +182,8 @@ def _head_box_px(result: Any, index: int) -> tuple[float, ...] | None:
         return None
     if status:
         n.fail("maq_densepose_result_get_head_box", status)
-    return tuple(box_px)
+    left, top, right, bottom = box_px
+    return left, top, right, bottom
 
 
 def part_name(part: int) -> str:

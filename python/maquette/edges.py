@@ -224,11 +224,13 @@ def edges_result(result: Any, lent: LentResult, curves: Curves | None = None) ->
         (n.lib.MAQ_EDGES_PLANE_DISTANCE, np.float32), (n.lib.MAQ_EDGES_PLANE_EXPECTED_ERROR, np.float32),
         (n.lib.MAQ_EDGES_PLANE_KIND, np.uint8),
     )  # fmt: skip
-    planes = [n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted]
+    distance, error, kinds = (
+        n.plane("maq_edges_result_get_plane", result, plane, shape, kind) for plane, kind in wanted
+    )
     metres = np.empty(shape, np.float32)
     n.call("maq_edges_result_copy_distance_m", result, n.ffi.from_buffer("float[]", metres), metres.size)
     stats = n.stats("maq_edges_stats", "maq_edges_result_get_stats", result)
-    return EdgesResult(*planes, metres, about.eps_r, curves, stats, lent)
+    return EdgesResult(distance, error, kinds, metres, about.eps_r, curves, stats, lent)
 
 
 def _doubles(pointer: Any, *shape: int) -> np.ndarray:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class PixelFormat(enum.IntEnum):
-    """How an array's pixels are meant; maq_pixel_format in frame.h."""
+    """How an array's pixels are meant; maq_pixel_format in frame.h. Names work, too: "bgr8"."""
 
     RGB8 = 1
     BGR8 = 2
@@ -35,8 +35,10 @@ class HasArrayInterface(Protocol):
     def __array_interface__(self) -> dict[str, Any]: ...
 
 
-# An image: a Frame, an array or what numpy can read as one (Pillow, torch, ...), or the path of an image file.
-ImageLike = Union["Frame", "ArrayLike", HasArrayInterface, "os.PathLike[str]"]
+# An array, or what numpy can read as one (Pillow, torch, ...).
+ArrayImage = Union["ArrayLike", HasArrayInterface]
+# An image: a Frame, such an array, or the path of an image file.
+ImageLike = Union["Frame", ArrayImage, "os.PathLike[str]"]
 
 _MODES = ("RGB", "RGBA", "L", "I;16", "F")  # of Pillow: read as they are; all others are converted
 _KINDS = {
@@ -59,6 +61,11 @@ class Intrinsics:
     cx_px: float
     cy_px: float
     distortion: tuple[float, ...] = (0.0,) * 8
+
+    def __repr__(self) -> str:
+        lens = ", with distortion" if any(self.distortion) else ""
+        focal = f"{self.fx_px:.1f}, {self.fy_px:.1f} px"
+        return f"<Intrinsics {self.width_px} x {self.height_px}, focal length {focal}{lens}>"
 
     @staticmethod
     def centred(width_px: int, height_px: int, fov_deg: float) -> Intrinsics:
@@ -102,20 +109,20 @@ class Frame(NativeObject):
 
     def __init__(
         self,
-        pixels: ArrayLike | HasArrayInterface,
-        format: PixelFormat | None = None,
+        pixels: ArrayImage,
+        format: PixelFormat | str | None = None,
         timestamp_ns: int = 0,
         intrinsics: Intrinsics | None = None,
     ) -> None:
         array = _array_of(pixels)
-        format = _format_of(array, pixels) if format is None else PixelFormat(format)
+        format = _format_of(array, pixels) if format is None else _pixel_format(format)
         kind, channels = _KINDS[format]
         shape = array.shape[:2] if channels == 1 and array.ndim == 2 else (*array.shape[:2], channels)
         if array.dtype != kind or array.shape != shape or array.ndim < 2:
             wanted = f"{np.dtype(kind)} [H, W{'' if channels == 1 else f', {channels}'}]"
             raise ValueError(f"{format.name} is {wanted}, not {array.dtype} {list(array.shape)}")
         n = native()
-        self._pixels = np.ascontiguousarray(array)
+        self._pixels: np.ndarray | None = np.ascontiguousarray(array)
         description = n.sized("maq_frame_desc")
         n.call("maq_frame_desc_init", description, description.struct_size)
         description.format, description.timestamp_ns = int(format), timestamp_ns
@@ -245,9 +252,10 @@ class Frame(NativeObject):
             return None
         return Origin(origin.horizon_ns / 1e9, origin.age_ns / 1e9, origin.captured_sequence)
 
-    def pixels(self, format: PixelFormat = PixelFormat.RGB8) -> np.ndarray:
+    def pixels(self, format: PixelFormat | str = PixelFormat.RGB8) -> np.ndarray:
         """A copy in RGB8, BGR8, RGBA8 or GREY8: uint8 [H, W, C], grey [H, W]. Raises MaquetteError for depth images."""
-        _, channels = _KINDS[PixelFormat(format)]
+        format = _pixel_format(format)
+        _, channels = _KINDS[format]
         height, width = self.shape
         out = np.empty((height, width) if channels == 1 else (height, width, channels), np.uint8)
         n = native()
@@ -273,6 +281,15 @@ class Frame(NativeObject):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes .png or .jpg; depth as .png in millimetres or .tif in metres. Raises MaquetteError."""
         native().call("maq_frame_save", self.handle, os.fsencode(path))
+
+
+def _pixel_format(format: PixelFormat | str) -> PixelFormat:
+    if not isinstance(format, str):
+        return PixelFormat(format)
+    names = {known.name.lower(): known for known in PixelFormat}
+    if format.lower() not in names:
+        raise ValueError(f'format is "{format}"; it is one of {", ".join(names)}')
+    return names[format.lower()]
 
 
 def _array_of(pixels: Any) -> np.ndarray:

@@ -240,7 +240,8 @@ class Head(NativeObject):
 
     def landmarks(self) -> dict[str, HeadLandmark]:
         """All landmarks of this head, by their names."""
-        n, handle, names = native(), self.handle, []
+        n, handle = native(), self.handle
+        names: list[str] = []
         while name := n.lib.maq_head_get_landmark_name(handle, len(names)):
             names.append(n.ffi.string(name).decode())
         return {name: self.landmark(name) for name in names}
@@ -435,7 +436,7 @@ class HeadRenderer(NativeObject):
         return rendered(self._lender, self.handle, camera.to_struct(), "maq_head_renderer_run", of_head=True)
 
 
-def _numbers(name: str, values: Sequence[float], meaning: str) -> list:
+def _numbers(name: str, values: Sequence[float], meaning: str) -> list[Any]:
     """Checks the count of numbers by `meaning`: C would fill missing numbers with 0."""
     given, count = np.asarray(values).tolist(), meaning.count(",") + 1
     if np.shape(values) != (count,):

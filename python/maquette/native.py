@@ -56,7 +56,7 @@ class Native:
             problem = f"{path} is not there. Build the SDK (make build), or set MAQ_LIBRARY."
             raise MaquetteError(problem, "MAQ_ERROR_NOT_FOUND")
         try:
-            from maquette._generated import ffi
+            from maquette._generated import ffi  # type: ignore[import-not-found]
         except ImportError:
             ffi = read_headers(_CHECKOUT / "sdk/include/maquette")
         for other in sorted(path.parent.glob("libturbojpeg.so*")):  # the wheel brings its own; found by its name then

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.frames import Frame, ImageLike, acquired_frame
+from maquette.frames import ArrayImage, Frame, acquired_frame
 from maquette.native import NativeObject, native
 from maquette.sources import Source
 
@@ -40,7 +40,7 @@ class Predictor(NativeObject):
         config = n.config("maq_predictor_config", {"method": method, **shared, **settings})
         super().__init__(n.create("maq_predictor", n.context, config))
 
-    def push(self, image: ImageLike, time_s: float | None = None) -> None:
+    def push(self, image: Frame | ArrayImage, time_s: float | None = None) -> None:
         """Adds the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
         seconds, counted from any moment. Earlier frames are forgotten at a cut, another size or a pause of a second.
         Raises MaquetteError."""
@@ -140,7 +140,7 @@ class Novelty(NativeObject):
         config = n.config("maq_novelty_config", {"method": method, **shared, **settings})
         super().__init__(n.create("maq_novelty", n.context, config))
 
-    def push(self, image: ImageLike, time_s: float | None = None) -> NoveltyScore:
+    def push(self, image: Frame | ArrayImage, time_s: float | None = None) -> NoveltyScore:
         """Scores the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
         seconds. Raises MaquetteError."""
         n = native()
@@ -205,7 +205,7 @@ class Concealer(NativeObject):
         return native().stats("maq_concealer_stats", "maq_concealer_get_stats", self.handle)
 
 
-def _timed_frame(image: ImageLike, time_s: float | None) -> Frame:
+def _timed_frame(image: Frame | ArrayImage, time_s: float | None) -> Frame:
     if isinstance(image, Frame) == (time_s is not None):
         raise ValueError("time_s is the time of an array, and needed; frames have their own")
     return image if isinstance(image, Frame) else Frame(image, timestamp_ns=round((time_s or 0) * 1e9))

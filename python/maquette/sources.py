@@ -176,9 +176,9 @@ class _Writer(NativeObject):
         """Completes the file. Raises MaquetteError, as when the disk is full."""
         native().call(self._finish, self.handle)
 
-    def __exit__(self, kind: object, *_: object) -> None:
+    def __exit__(self, *error: object) -> None:
         try:
-            if kind is None:
+            if error[0] is None:
                 self.finish()
         finally:
             self.close()
@@ -207,8 +207,8 @@ class Recorder(_Writer):
         super().__init__(n.create("maq_recorder", n.context, os.fsencode(path), handle, config))
 
     def add(self, image: ImageLike, time_s: float | None = None) -> None:
-        """Adds a frame, and does not keep it. time_s: the time of an array. Raises MaquetteError, also for a frame that
-        is not later than the one before."""
+        """Adds a frame, and does not keep it. time_s: the time of an array (not of a path). Raises MaquetteError, also
+        for a frame that is not later than the one before."""
         if time_s is not None:
             image = Frame(image, timestamp_ns=round(time_s * 1e9))  # type: ignore[arg-type]
         super().add(image)

@@ -21,8 +21,7 @@ def log_frame(path: str, frame: Frame) -> None:
     """The image, or the depth in metres, at the frame's time on the timeline "media"."""
     rerun.set_time("media", duration=frame.timestamp_ns / 1e9)
     pixels = np.asarray(frame)
-    is_depth = pixels.dtype == np.float32
-    rerun.log(path, rerun.DepthImage(pixels, meter=1.0) if is_depth else rerun.Image(pixels))
+    rerun.log(path, rerun.Image(pixels) if pixels.dtype == np.uint8 else rerun.DepthImage(pixels, meter=1.0))
     if frame.intrinsics is not None:
         log_intrinsics(path, frame.intrinsics)
 
@@ -45,29 +44,31 @@ def log_curves(path: str, curves: Curves) -> None:
     rerun.log(f"{path}/corners", rerun.Points3D(curves.corners_m, colors=(230, 50, 40)))
     boxes = curves.boxes
     turns = [rerun.Quaternion(xyzw=_quaternion(box.axes.T)) for box in boxes]
-    half_sizes = [box.size_m / 2 for box in boxes]
+    half_sizes, centres = [box.size_m / 2 for box in boxes], [box.centre_m for box in boxes]
     labels = [repr(box)[5:-1] for box in boxes]
-    centres = [box.centre_m for box in boxes]
     rerun.log(f"{path}/boxes", rerun.Boxes3D(half_sizes=half_sizes, centers=centres, quaternions=turns, labels=labels))
 
 
 def log_head(path: str, mesh: HeadMesh) -> None:
-    """The mesh with its colours; x to the person's left, y to the back, z up."""
-    arrays = {"vertex_normals": mesh.normals, "vertex_colors": mesh.colours, "triangle_indices": mesh.triangles}
+    """The mesh with its colours; z up."""
+    surface = rerun.Mesh3D(
+        vertex_positions=mesh.positions_m, vertex_normals=mesh.normals, vertex_colors=mesh.colours,
+        triangle_indices=mesh.triangles,
+    )  # fmt: skip
     rerun.log(path, rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    rerun.log(path, rerun.Mesh3D(vertex_positions=mesh.positions_m, **arrays))
+    rerun.log(path, surface)
 
 
 def log_camera(path: str, camera: PinholeCamera) -> None:
     """A camera and its pose."""
-    rotation, centre = np.asarray(camera.rotation), np.asarray(camera.centre)
-    rerun.log(path, rerun.Transform3D(mat3x3=rotation.T, translation=centre))
+    rerun.log(path, rerun.Transform3D(mat3x3=np.transpose(camera.rotation), translation=np.asarray(camera.centre)))
     log_intrinsics(path, camera.intrinsics)
 
 
 def log_intrinsics(path: str, k: Intrinsics) -> None:
-    size = {"resolution": (k.width_px, k.height_px), "camera_xyz": rerun.ViewCoordinates.RDF}
-    rerun.log(path, rerun.Pinhole(focal_length=(k.fx_px, k.fy_px), principal_point=(k.cx_px, k.cy_px), **size))
+    focal, middle, size = (k.fx_px, k.fy_px), (k.cx_px, k.cy_px), (k.width_px, k.height_px)
+    axes = rerun.ViewCoordinates.RDF
+    rerun.log(path, rerun.Pinhole(focal_length=focal, principal_point=middle, resolution=size, camera_xyz=axes))
 
 
 def _quaternion(rotation: np.ndarray) -> np.ndarray:

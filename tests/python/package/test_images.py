@@ -82,6 +82,12 @@ def test_a_wrong_image_is_told_in_a_sentence(image, text):
         maquette.Frame(image)
 
 
+def test_formats_have_names(rgb):
+    assert np.array_equal(maquette.Frame(rgb, "bgr8").pixels("rgb8"), rgb[..., ::-1])
+    with pytest.raises(ValueError, match='format is "bgr9"; it is one of rgb8, bgr8'):
+        maquette.Frame(rgb, "bgr9")
+
+
 def test_a_missing_file_is_an_error_of_python():
     with pytest.raises(FileNotFoundError, match="nowhere"):
         maquette.DensePose(threads=1).run("nowhere.jpg")

@@ -22,7 +22,9 @@ def folder(request, tmp_path_factory) -> Path:
 
 def elf_files(folder: Path) -> list[Path]:
     files = [path for part in ("bin", "lib") for path in sorted((folder / part).rglob("*"))]
-    return [path for path in files if path.is_file() and not path.is_symlink() and path.open("rb").read(4) == b"\x7fELF"]
+    return [
+        path for path in files if path.is_file() and not path.is_symlink() and path.open("rb").read(4) == b"\x7fELF"
+    ]
 
 
 def searched(file: Path) -> list[str]:

@@ -41,9 +41,13 @@ def checked(program: str, folder: Path) -> list[str]:
     """Returns the lines of mypy about a program of a user."""
     path = folder / "program.py"
     path.write_text(program)
+    return mypy("--follow-imports=silent", path)
+
+
+def mypy(*arguments: object) -> list[str]:
     run = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--no-error-summary",
-         "--cache-dir", str(ROOT / "build/mypy"), path],
+        [sys.executable, "-m", "mypy", "--strict", "--no-warn-return-any", "--no-error-summary",
+         "--cache-dir", str(ROOT / "build/mypy"), *arguments],
         capture_output=True, text=True, check=False, env={"MYPYPATH": str(ROOT / "python"), "PATH": ""},
     )  # fmt: skip
     assert not run.stderr, run.stderr
@@ -54,6 +58,10 @@ def test_a_type_checker_accepts_right_settings_and_refuses_wrong_ones(tmp_path):
     assert checked(RIGHT, tmp_path) == []
     wrong = checked(WRONG, tmp_path)
     assert [int(line.split(":")[1]) for line in wrong if ": error:" in line] == [3, 4, 5, 6], wrong
+
+
+def test_the_package_itself_has_types():
+    assert mypy(ROOT / "python/maquette") == []
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ SCRIPT = """
 import sys
 import maquette
 import maquette.native
+import maquette.adapters.detectron2
 result = maquette.DensePose(threads=1).run(maquette.Source("stub:people?count=1&size=320x240").read())
 source = maquette.Source("stub:solids?scene=box&size=320x240")
 edges = maquette.Edges(threads=1).run(source.read(), curves=True)

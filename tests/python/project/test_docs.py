@@ -8,7 +8,8 @@ import pytest
 
 GUIDES = sorted(Path("docs/guide").glob("*.md"))
 PAGES = [
-    *map(Path, ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "docs/README.md", "python/README.md")),
+    *map(Path, ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *map(Path, ("docs/README.md", "python/README.md")),
     *GUIDES,
     *sorted(Path("docs/reference").rglob("*.md")),
 ]
@@ -79,7 +80,7 @@ def symbol_exists(match: re.Match) -> bool:
 SETTINGS = set()
 for _name in TRACKED:
     if _name.startswith(
-        ("sdk/", "cmake/", "python/", "CMakeLists.txt", "desktop_demo/", "scripts/")
+        ("sdk/", "cmake/", "python/", "CMakeLists.txt", "desktop_demo/", "scripts/", "tests/release/")
     ) and _name.endswith((".cpp", ".h", ".txt", ".cmake", ".py", ".sh")):
         SETTINGS.update(re.findall(r"\bMAQ_\w+", Path(_name).read_text()))
 

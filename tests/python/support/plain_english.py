@@ -14,7 +14,7 @@ from pathlib import Path
 MAX_WORDS = [
     (r"sdk/include/maquette/.*\.h(pp)?", 25),
     (r"sdk/tools/.*\.cpp|desktop_demo/src/main\.cpp", 25),
-    (r"README\.md|ARCHITECTURE\.md|CONTRIBUTING\.md|docs/(guide|reference)/.*\.md", 30),
+    (r"(README|ARCHITECTURE|CONTRIBUTING|SECURITY|CODE_OF_CONDUCT)\.md|docs/(guide|reference)/.*\.md", 30),
 ]
 OPENING = re.compile(r"(Of|What|Those|Whose)\b")
 PHRASE = re.compile(

@@ -68,7 +68,11 @@ set_target_properties(onnxruntime::onnxruntime PROPERTIES IMPORTED_CONFIGURATION
   IMPORTED_LOCATION_RELEASE \"${LIBRARY}\" INTERFACE_INCLUDE_DIRECTORIES \"${HEADERS}\")
 ")
 must_run("${CMAKE_COMMAND}" -S "${app}" -B package-build "-DMAQUETTE=${SOURCE_DIR}"
-  "-Donnxruntime_DIR=${package}" -DMAQ_INSTALL=ON)
+  "-Donnxruntime_DIR=${package}" -DMAQ_INSTALL=ON -DBUILD_SHARED_LIBS=OFF)
+file(READ "${WORK_DIR}/package-build/CMakeFiles/people.dir/link.txt" link)
+if(NOT link MATCHES "libmaquette[.]a" OR link MATCHES "libmaquette[.]so")
+  message(FATAL_ERROR "With BUILD_SHARED_LIBS=OFF the app links ${link}")
+endif()
 get_filename_component(real "${LIBRARY}" REALPATH)
 get_filename_component(staged
   "${WORK_DIR}/package-build/_deps/maquette-build/stage/lib/maquette/libonnxruntime.so.1" REALPATH)

@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <unistd.h>
 
+#include <climits>
 #include <cstring>
 #include <new>
 #include <string>
@@ -23,8 +24,12 @@ std::string library_folder() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<const void*>(&library_folder), &info) == 0 || info.dli_fname == nullptr) return "";
   const std::string file = info.dli_fname;
-  const size_t slash = file.rfind('/');
-  return slash == std::string::npos ? "./" : file.substr(0, slash + 1);
+  if (const size_t slash = file.rfind('/'); slash != std::string::npos) return file.substr(0, slash + 1);
+  // A program with the library inside, which the shell found on its PATH: its name has no folder.
+  char program[PATH_MAX];
+  const ssize_t length = readlink("/proc/self/exe", program, sizeof program);
+  const std::string path(program, length > 0 ? size_t(length) : 0);
+  return path.substr(0, path.rfind('/') + 1);
 }
 
 std::string find_shared_file(const std::string& name) {
@@ -36,7 +41,12 @@ std::string find_shared_file(const std::string& name) {
   return "";
 }
 
-std::string module_path(const char* file) { return library_folder() + "maquette/" + file; }
+std::string module_path(const char* file) {
+  const std::string library = library_folder();
+  std::string of_program = concatenate(library, "../lib/maquette/", file);  // of one with the library inside
+  std::string beside = concatenate(library, "maquette/", file);
+  return access(beside.c_str(), F_OK) != 0 && access(of_program.c_str(), F_OK) == 0 ? of_program : beside;
+}
 
 LibraryOpening open_library(const std::string& path) {
   for (bool again = false;; again = true) {

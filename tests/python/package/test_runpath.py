@@ -1,4 +1,5 @@
-"""Programs and libraries search only absolute folders and folders beside themselves for other libraries."""
+"""Programs and libraries search only absolute folders and folders beside themselves for other libraries, and no
+installed file knows where it was built."""
 
 import re
 import shutil
@@ -11,13 +12,16 @@ ROOT = Path(__file__).parents[3]
 BUILD = ROOT / "build/release"
 
 
-@pytest.fixture(scope="module", params=["staged", "installed"])
-def folder(request, tmp_path_factory) -> Path:
-    if request.param == "staged":
-        return BUILD / "stage"
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> Path:
     prefix = tmp_path_factory.mktemp("prefix")
     subprocess.run(["cmake", "--install", BUILD, "--prefix", prefix], check=True, capture_output=True)
     return prefix
+
+
+@pytest.fixture(params=["staged", "installed"])
+def folder(request) -> Path:
+    return BUILD / "stage" if request.param == "staged" else request.getfixturevalue("installed")
 
 
 def elf_files(folder: Path) -> list[Path]:
@@ -48,3 +52,10 @@ def test_no_library_is_taken_from_the_current_folder(folder):
     ]
     assert not wrong, wrong
     assert any(searched(file) for file in files)
+
+
+def test_no_installed_file_has_the_path_of_the_build(installed):
+    """Otherwise builds in two folders differ; `make test-reproducible` compares two whole builds."""
+    files = [path for path in installed.rglob("*") if path.is_file()]
+    assert len(files) > 50
+    assert [path for path in files if bytes(ROOT) in path.read_bytes()] == []

@@ -87,6 +87,28 @@ test-newcomer:  ## the commands of README.md in a bare Debian, from top to botto
 	@scripts/install-packages.sh newcomer
 	@$(PYTHON) -m tests.newcomer
 
+.PHONY: release
+release: wheel android  ## all packages with checksums, signature and SBOM, into build/dist (docs/reference/packages.md)
+	@scripts/install-packages.sh release
+	@scripts/release/build.sh
+
+.PHONY: test-release
+test-release: packages-test  ## unpacks build/dist; checks signature, checksums, SBOM, lintian, and runs its program; not part of `test-all`
+	@scripts/install-packages.sh release
+	@scripts/make-venv.sh dev,release
+	@.venv/bin/python -m pytest tests/release
+
+.PHONY: test-reproducible
+test-reproducible: packages-demo  ## builds the library in two folders and compares all files; 7 to 15 minutes of processor time; not part of `test-all`
+	@JOBS=$(JOBS) scripts/release/reproducible.sh
+
+.PHONY: site
+site:  ## guides and API reference as web pages, into build/site, and a check of all their links; not part of `test-all`
+	@scripts/install-packages.sh site
+	@scripts/make-venv.sh dev,site
+	@.venv/bin/python scripts/site/build.py
+	@.venv/bin/python -m pytest tests/site
+
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench

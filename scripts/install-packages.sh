@@ -9,16 +9,18 @@
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
+#   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
+#   scripts/install-packages.sh site        to build the site: Doxygen, Maven
 #   scripts/install-packages.sh test lint   what both need, at once
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,14s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,16s/^# \{0,1\}//p' "$0"; }
 
 for group in "${@:-}"; do
     case "$group" in
-        demo | desktop | test | isa | camera-vm | lint | android | newcomer) ;;
+        demo | desktop | test | isa | camera-vm | lint | android | newcomer | release | site) ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac
@@ -110,6 +112,17 @@ if wants android; then
     needs_package python3-pip         # brings headers of a C library like Android's
 fi
 ! wants newcomer || needs_command debootstrap debootstrap
+if wants site; then
+    needs_command doxygen doxygen
+    needs_command javac openjdk-17-jdk-headless
+    needs_command mvn maven           # brings Dokka
+fi
+if wants release; then
+    needs_command dh debhelper
+    needs_command help2man help2man
+    needs_command lintian lintian
+    needs_command minisign minisign
+fi
 
 [ ${#missing[@]} -eq 0 ] && exit 0
 

@@ -3,8 +3,8 @@
     python3 scripts/android/aar.py --classes CLASSES --d8 "java -cp r8.jar com.android.tools.r8.D8 ..." \
         --native arm64-v8a build/android/arm64-v8a/*.so --version 0.3.0 --out build/android
 
-Writes maquette-VERSION.aar, a Maven repository with it, and sizes.json, and prints the sizes. Fails, with a line for
-each, where
+Writes maquette-VERSION.aar, a Maven repository with it and its sources, and sizes.json, and prints the sizes.
+Fails, with a line for each, where
 - a native method of the Kotlin classes is missing in a library, or a library exports anything else;
 - a library needs one that is neither Android's nor in the AAR, or has a segment that does not fit pages of 16 KB;
 - D8 does not accept the classes;
@@ -12,10 +12,12 @@ each, where
 """
 
 import argparse
+import hashlib
 import io
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,6 +26,9 @@ import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts/release"))
+import sbom  # noqa: E402
+
 MODULE = ROOT / "android/maquette"
 MIN_SDK = 26
 PAGE_BYTES = 16384
@@ -113,7 +118,7 @@ def add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 def write_aar(path: Path, classes: Path, native: dict[str, list[Path]]) -> None:
     """docs: developer.android.com/studio/projects/android-library, "Anatomy of an AAR file"."""
-    with zipfile.ZipFile(path, "w") as aar:
+    with zipfile.ZipFile(path, "w+") as aar:
         add(aar, "AndroidManifest.xml", manifest().encode())
         add(aar, "classes.jar", jar_of(classes))
         add(aar, "R.txt", b"")  # no resources
@@ -128,6 +133,8 @@ def write_aar(path: Path, classes: Path, native: dict[str, list[Path]]) -> None:
         add(aar, "META-INF/licenses/maquette/LICENSE", (ROOT / "LICENSE").read_bytes())
         for file in sorted(p for p in (ROOT / "sdk/licenses").rglob("*") if p.is_file()):
             add(aar, f"META-INF/licenses/{file.relative_to(ROOT / 'sdk/licenses')}", file.read_bytes())
+        hashes = {name: hashlib.sha256(aar.read(name)).hexdigest() for name in aar.namelist()}
+        add(aar, "META-INF/sbom/maquette.cdx.json", sbom.text_of("maquette-android", hashes).encode())
 
 
 def problems_of_aar(path: Path, abis: list[str]) -> list[str]:
@@ -159,9 +166,11 @@ def sizes_of(path: Path) -> list[tuple[str, int, int]]:
 
 
 def write_repository(out: Path, aar: Path, version: str, dependencies: list[str]) -> None:
+    shutil.rmtree(out / "repository", ignore_errors=True)
     folder = out / "repository/dev/maquette/maquette" / version
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True)
     (folder / aar.name).write_bytes(aar.read_bytes())
+    (folder / f"{aar.stem}-sources.jar").write_bytes(jar_of(MODULE / "src/main/kotlin"))
     of_maven = "".join(
         "    <dependency><groupId>{}</groupId><artifactId>{}</artifactId><version>{}</version></dependency>\n".format(
             *dependency.split(":")
@@ -175,11 +184,20 @@ def write_repository(out: Path, aar: Path, version: str, dependencies: list[str]
   <artifactId>maquette</artifactId>
   <version>{version}</version>
   <packaging>aar</packaging>
-  <licenses><license><name>Apache-2.0</name></license></licenses>
+  <name>Maquette</name>
+  <description>On-device vision: dense pose and scenes from a camera, on the CPU</description>
+  <licenses>
+    <license><name>Apache-2.0</name><url>https://www.apache.org/licenses/LICENSE-2.0.txt</url></license>
+  </licenses>
   <dependencies>
 {of_maven}  </dependencies>
 </project>
 """)
+    for file in list(folder.iterdir()):  # Maven and Gradle ask for these
+        for algorithm in ("md5", "sha1", "sha256"):
+            (folder / f"{file.name}.{algorithm}").write_text(
+                hashlib.file_digest(file.open("rb"), algorithm).hexdigest()
+            )
 
 
 def problems_of_bytecode(classes: Path, d8: str) -> list[str]:

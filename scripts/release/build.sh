@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# Collects a release in build/dist and prints the command that tags it; `make release` builds its parts first:
+#
+#   scripts/release/build.sh
+#
+#   *.whl                        Python packages                        (build/wheel)
+#   maquette-VERSION-*.tar.gz    library, headers, programs, networks   (build/release)
+#   maquette-models-*.tar.gz     the networks of each system
+#   *.deb                        Debian packages                        (deb.sh)
+#   maven/                       Maven repository with the AAR          (build/android)
+#   SHA256SUMS, SHA256SUMS.minisig
+#
+# Each package contains its SBOM. MAQ_MINISIGN_KEY: the secret key that signs; default: the test key of this
+# repository, which proves nothing. docs/reference/packages.md tells how to check a release.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+case "${1:-}" in '') ;; *) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
+key="$(realpath "${MAQ_MINISIGN_KEY:-tests/release/TEST-ONLY.key}")"
+version="$(sed -n 's/^project(maquette VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)"
+epoch="$(git log -1 --format=%ct)"
+dist="$PWD/build/dist"
+work="$PWD/build/dist-work"
+rm -rf "$dist" "$work"
+mkdir -p "$dist" "$work"
+python="${PYTHON:-python3}"
+
+# pack NAME COMPONENT...: a tarball of installed components with their SBOM; the same content gives the same bytes.
+pack() {
+    local name=$1 component
+    for component in "${@:2}"; do
+        cmake --install build/release --prefix "$work/$name" --component "$component" >/dev/null
+    done
+    mkdir -p "$work/$name/share/maquette/licenses"
+    cp LICENSE "$work/$name/share/maquette/licenses/"
+    "$python" scripts/release/sbom.py --name "${name%-"$version"*}" --root "$work/$name" \
+        --out "$work/$name/share/maquette/sbom/${name%-"$version"*}.cdx.json"
+    tar --create --directory "$work" --sort=name --mtime="@$epoch" --owner=0 --group=0 --numeric-owner \
+        --mode=u+w,go=rX "$name" | gzip -n -9 >"$dist/$name.tar.gz"
+}
+systems=(densepose scenes edges heads prediction)
+pack "maquette-$version-linux-$(uname -m)" runtime development tools "${systems[@]/#/models-}"
+for system in "${systems[@]}"; do pack "maquette-models-$system-$version" "models-$system"; done
+
+scripts/release/deb.sh "$dist"
+
+for wheel in build/wheel/*.whl; do
+    cp "$wheel" "$dist/"
+    "$python" scripts/release/sbom.py --wheel "$dist/${wheel##*/}"
+done
+
+cp -r build/android/repository "$dist/maven"
+
+cd "$dist"
+find . -type f -printf '%P\n' | LC_ALL=C sort | xargs -d '\n' sha256sum >"$work/SHA256SUMS"
+mv "$work/SHA256SUMS" .
+minisign -S -s "$key" -m SHA256SUMS -t "Maquette $version, commit $(git rev-parse --short=12 HEAD)"
+du -ah --apparent-size "$dist" | grep -E '\.(whl|gz|deb|aar|minisig)$|SUMS$'
+echo
+[[ "$key" != */TEST-ONLY.key ]] || echo "Signed with the test key: this is not a release. Set MAQ_MINISIGN_KEY."
+echo "Check it: make test-release"
+echo "Tag it:   git tag -a v$version -m 'Maquette $version' $(git rev-parse --short=12 HEAD)"

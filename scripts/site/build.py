@@ -1,0 +1,149 @@
+"""Builds the site of guides and API reference into build/site; `make site` installs what it needs first.
+
+    .venv/bin/python scripts/site/build.py [--without-kotlin]
+
+C and C++ by Doxygen, Python by mkdocstrings, Kotlin by Dokka, pages of this repository; MkDocs gives all one look.
+"""
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import c_pages
+import sources
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = ROOT / "build/site-work"
+PAGES = WORK / "pages"
+SITE = ROOT / "build/site"
+PROJECT = ["ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "CHANGELOG.md"]
+FOLDERS = ["python/README.md", "android/README.md", "sdk/README.md"]
+DOXYGEN = """
+INPUT = sdk/include/maquette
+FILE_PATTERNS = *.h *.hpp
+OUTPUT_DIRECTORY = {work}/doxygen
+INPUT_FILTER = "{python} {root}/scripts/site/header_filter.py"
+GENERATE_HTML = NO
+GENERATE_LATEX = NO
+GENERATE_XML = YES
+XML_PROGRAMLISTING = NO
+EXTRACT_ALL = YES
+MACRO_EXPANSION = YES
+EXPAND_ONLY_PREDEF = YES
+PREDEFINED = MAQ_API= __cplusplus
+TYPEDEF_HIDES_STRUCT = YES
+WARN_IF_UNDOCUMENTED = NO
+QUIET = YES
+"""
+
+
+def run(*command: str | Path, **options) -> None:
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, **options)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
+
+
+def write_c_pages() -> None:
+    (WORK / "doxygen").mkdir()
+    config = WORK / "Doxyfile"
+    config.write_text(DOXYGEN.format(work=WORK, root=ROOT, python=sys.executable))
+    run("doxygen", config)
+    c_pages.Pages(WORK / "doxygen/xml").write(PAGES / "api")
+
+
+def write_python_pages() -> None:
+    """One page a module with public names; the names are those that the package exports."""
+    package = ROOT / "python/maquette"
+    imports = re.findall(
+        r"^from maquette\.(\w+) import (\([^)]*\)|.*)$", (package / "__init__.py").read_text(), re.MULTILINE
+    )
+    folder = PAGES / "api/python"
+    folder.mkdir(parents=True)
+    rows = []
+    for module, names in imports:
+        public = [name for name in re.findall(r"\w+", names) if not name.startswith("_")]
+        text = "\n\n".join(f"::: maquette.{module}.{name}" for name in public)
+        (folder / f"{module}.md").write_text(f"# maquette.{module}\n\n{text}\n")
+        rows.append(f"| [maquette.{module}]({module}.md) | {', '.join(f'`{name}`' for name in public)} |")
+    head = "# Python API\n\nAll names are in the package `maquette`. [How to install it](../../python/README.md).\n\n"
+    (folder / "README.md").write_text(head + "| module | names |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+
+
+def write_kotlin_pages(is_left_out: bool) -> None:
+    folder = PAGES / "api/kotlin"
+    if is_left_out:
+        folder.mkdir(parents=True)
+        (folder / "README.md").write_text(
+            "# Kotlin API\n\nThis copy of the site was built without Dokka (`--without-kotlin`).\n"
+        )
+        return
+    run("mvn", "--batch-mode", "--quiet", "-f", "tests/android/pom.xml", "org.jetbrains.dokka:dokka-maven-plugin:dokka")
+    shutil.copytree(ROOT / "build/android-tests/dokka", folder)
+    for page in folder.rglob("*.md"):
+        text = re.sub(r"^\[androidJvm\]\\?$|^\[jvm\]\\?$", "", page.read_text(), flags=re.MULTILINE)
+        lines = text.splitlines()
+        if lines and lines[0].startswith("//["):  # the path of links above each page
+            lines = lines[1:]
+        page.write_text("\n".join(lines) + "\n")
+    (folder / "index.md").rename(folder / "README.md")
+
+
+def navigation() -> list:
+    def titled(folder: str) -> list:
+        return [path.relative_to(PAGES).as_posix() for path in sorted((PAGES / folder).rglob("*.md"))]
+
+    def reference(folder: str) -> list:
+        pages = [path for path in titled(folder) if not path.endswith("README.md")]
+        return [f"{folder}/README.md", *[{Path(path).name.removesuffix(".md"): path} for path in pages]]
+
+    return [
+        {"Start": "README.md"},
+        {"Guide": ["docs/README.md", *titled("docs/guide")]},
+        {
+            "API": [
+                {"C": reference("api/c")},
+                {"C++": reference("api/cpp")},
+                {"Python": reference("api/python")},
+                {"Kotlin": "api/kotlin/README.md"},
+            ]
+        },
+        {"Reference": titled("docs/reference")},
+        {"Research": titled("docs/research") + titled("docs/benchmarks")},
+        {"Project": [*PROJECT, *FOLDERS]},
+    ]
+
+
+def build() -> None:
+    config = yaml.safe_load((ROOT / "scripts/site/mkdocs.yml").read_text())
+    config |= {"docs_dir": str(PAGES), "site_dir": str(SITE), "nav": navigation()}
+    options = config["plugins"][1]["mkdocstrings"]["handlers"]["python"]
+    options["paths"] = [str(ROOT / "python")]
+    file = WORK / "mkdocs.yml"
+    # The function that makes anchors as GitHub does has no YAML of its own.
+    slugs = "!!python/object/apply:pymdownx.slugs.slugify {kwds: {case: lower}}"
+    file.write_text(yaml.safe_dump(config, sort_keys=False).replace("slugify: github", f"slugify: {slugs}"))
+    shutil.copytree(ROOT / "scripts/site/style", PAGES / "style")
+    run(sys.executable, "-m", "mkdocs", "build", "--quiet", "--config-file", file)
+    print(f"{SITE}/index.html: {len(list(SITE.rglob('*.html')))} pages")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--without-kotlin", action="store_true", help="leave out Dokka, which needs Maven")
+    arguments = parser.parse_args()
+    shutil.rmtree(WORK, ignore_errors=True)
+    shutil.rmtree(SITE, ignore_errors=True)
+    PAGES.mkdir(parents=True)
+    write_c_pages()
+    write_python_pages()
+    write_kotlin_pages(arguments.without_kotlin)
+    sources.copy_pages(ROOT, PAGES, ["README.md", "docs/README.md", *PROJECT, *FOLDERS])
+    build()
+
+
+if __name__ == "__main__":
+    main()

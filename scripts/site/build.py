@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import c_pages
+import kotlin_pages
 import sources
 import yaml
 
@@ -81,20 +82,15 @@ def write_kotlin_pages(is_left_out: bool) -> None:
             "# Kotlin API\n\nThis copy of the site was built without Dokka (`--without-kotlin`).\n"
         )
         return
+    shutil.rmtree(ROOT / "build/android-tests/dokka", ignore_errors=True)
     run("mvn", "--batch-mode", "--quiet", "-f", "tests/android/pom.xml", "org.jetbrains.dokka:dokka-maven-plugin:dokka")
-    shutil.copytree(ROOT / "build/android-tests/dokka", folder)
-    for page in folder.rglob("*.md"):
-        text = re.sub(r"^\[androidJvm\]\\?$|^\[jvm\]\\?$", "", page.read_text(), flags=re.MULTILINE)
-        lines = text.splitlines()
-        if lines and lines[0].startswith("//["):  # the path of links above each page
-            lines = lines[1:]
-        page.write_text("\n".join(lines) + "\n")
-    (folder / "index.md").rename(folder / "README.md")
+    kotlin_pages.Types(ROOT / "build/android-tests/dokka").write(folder)
 
 
 def navigation() -> list:
     def titled(folder: str) -> list:
-        return [path.relative_to(PAGES).as_posix() for path in sorted((PAGES / folder).rglob("*.md"))]
+        pages = sorted((PAGES / folder).rglob("*.md"), key=lambda page: page.with_suffix(""))
+        return [page.relative_to(PAGES).as_posix() for page in pages]
 
     def reference(folder: str) -> list:
         pages = [path for path in titled(folder) if not path.endswith("README.md")]
@@ -108,7 +104,7 @@ def navigation() -> list:
                 {"C": reference("api/c")},
                 {"C++": reference("api/cpp")},
                 {"Python": reference("api/python")},
-                {"Kotlin": "api/kotlin/README.md"},
+                {"Kotlin": reference("api/kotlin")},
             ]
         },
         {"Reference": titled("docs/reference")},
@@ -123,11 +119,10 @@ def build() -> None:
     options = config["plugins"][1]["mkdocstrings"]["handlers"]["python"]
     options["paths"] = [str(ROOT / "python")]
     file = WORK / "mkdocs.yml"
-    # The function that makes anchors as GitHub does has no YAML of its own.
-    slugs = "!!python/object/apply:pymdownx.slugs.slugify {kwds: {case: lower}}"
-    file.write_text(yaml.safe_dump(config, sort_keys=False).replace("slugify: github", f"slugify: {slugs}"))
+    file.write_text(yaml.safe_dump(config, sort_keys=False))
     shutil.copytree(ROOT / "scripts/site/style", PAGES / "style")
     run(sys.executable, "-m", "mkdocs", "build", "--quiet", "--config-file", file)
+    (SITE / "404.html").unlink()  # of a site at the root of its host
     print(f"{SITE}/index.html: {len(list(SITE.rglob('*.html')))} pages")
 
 

@@ -1,6 +1,7 @@
 """Makes Markdown pages of the C and C++ API from Doxygen's XML: a page for each header, in the header's order."""
 
 import re
+import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -35,9 +36,20 @@ def plain(node: ElementTree.Element | None) -> str:
     return "" if node is None else " ".join("".join(node.itertext()).split())
 
 
+def tidy(code: str) -> str:
+    """Spaces as the headers have them: none inside angle brackets, asterisks beside the type."""
+    code = re.sub(r"< (?=\w)", "<", code.replace("maquette::", ""))
+    while (closer := re.sub(r"(?<=[\w>*]) >", ">", code)) != code:
+        code = closer
+    return re.sub(r" ([*&]+) ?", r"\1 ", code).replace("(* ", "(*").replace(") (", ")(").rstrip()
+
+
 def signature(member: ElementTree.Element) -> str:
-    code = f"{plain(member.find('definition'))}{plain(member.find('argsstring'))}".replace("maquette::", "")
-    if len(code) <= 100 or "(" not in code:
+    code = plain(member.find("definition"))
+    if member.get("kind") != "typedef":
+        code += plain(member.find("argsstring"))
+    code = tidy(code)
+    if len(code) <= 100 or "(" not in code or member.get("kind") == "typedef":
         return code
     head, _, rest = code.partition("(")
     arguments, _, tail = rest.rpartition(")")
@@ -71,7 +83,8 @@ def class_of(compound: ElementTree.Element) -> Item:
     if compound.get("kind") == "struct" and not any(m.get("kind") == "function" for m in members):
         item.columns = ("field", "type", "meaning")
         item.rows = [
-            (plain(m.find("name")), plain(m.find("type")) + plain(m.find("argsstring")), comment(m)) for m in members
+            (plain(m.find("name")), tidy(plain(m.find("type")) + plain(m.find("argsstring"))), comment(m))
+            for m in members
         ]
     else:
         item.members = sorted((item_of(m) for m in members), key=lambda member: member.line)
@@ -141,12 +154,22 @@ class Pages:
     def cell(self, text: str, header: str) -> str:
         return " ".join(self.linked(re.sub(r"([*<\[|])", r"\\\1", text), header).split())
 
-    def section(self, item: Item, level: int, anchors: dict[str, int]) -> str:
+    def members(self, item: Item) -> list[str]:
+        """The public members of a class, as the header has them, without bodies."""
+        lines = []
+        for member in item.members:
+            if member.kind == "friend":
+                continue
+            text = " ".join(member.text.split())
+            lines += [f"  // {line}" for line in textwrap.wrap(text, 100)]
+            code = member.code.replace(f"{item.name}::", "", 1) if member.kind == "function" else member.code
+            lines += [f"  {line}" for line in code.splitlines()]
+        return lines
+
+    def section(self, item: Item, anchors: dict[str, int]) -> str:
         count = anchors[item.name] = anchors.get(item.name, 0) + 1
         anchor = re.sub(r"\W+", "-", item.name) + (f"-{count}" if count > 1 else "")
-        out = (
-            [f"{'#' * level} {item.name.replace('<', '&lt;')} {{#{anchor}}}", ""] if count == 1 or not item.code else []
-        )
+        out = [f"## {item.name.replace('<', '&lt;')} {{#{anchor}}}", ""] if count == 1 or not item.code else []
         out += ["```cpp", item.code, "```", ""] if item.code else []
         out += [self.prose(item.text, item.header), ""] if item.text else []
         if item.rows:
@@ -156,19 +179,15 @@ class Pages:
                 for row in item.rows
             ]
             out.append("")
-        names: dict[str, int] = {}
-        for member in item.members:
-            if member.kind not in ("friend", "variable") or member.text:
-                member_anchors = {member.name: 1} if member.name in names else {}
-                names[member.name] = 1
-                out.append(self.section(member, level + 1, member_anchors).replace("{#", f"{{#{anchor}-", 1))
+        if item.members:
+            out += ["```cpp", f"{item.kind} {item.name} {{", *self.members(item), "};", "```", ""]
         return "\n".join(out)
 
     def page(self, header: str) -> str:
         described = next((item.text for item in self.headers[header] if item.kind == "file"), "")
         out = [f"# {header}", "", f"```c\n#include <maquette/{header}>\n```", "", self.prose(described, header), ""]
         anchors: dict[str, int] = {}
-        out += [self.section(item, 2, anchors) for item in self.headers[header] if item.kind != "file"]
+        out += [self.section(item, anchors) for item in self.headers[header] if item.kind != "file"]
         return "\n".join(out) + "\n"
 
     def index(self, title: str, suffix: str, first: str) -> str:

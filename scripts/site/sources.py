@@ -32,6 +32,21 @@ def target_of(path: str, root: Path) -> str | None:
     return path if file.suffix in (".md", *IMAGES) else f"{path}.md"
 
 
+def with_anchors(text: str) -> str:
+    """The page with an anchor at each heading, as GitHub and GitLab make them: repeated ones end in -1, -2, …"""
+    found: dict[str, int] = {}
+    lines, is_fenced = [], False
+    for line in text.splitlines():
+        is_fenced ^= line.startswith("```")
+        if not is_fenced and re.match(r"#{1,6} ", line):
+            shown = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", line.lstrip("# ").rstrip(" #"))
+            name = re.sub(r"[^\w\- ]", "", shown.lower()).replace(" ", "-")
+            found[name] = found.get(name, -1) + 1
+            line += f" {{#{name}-{found[name]}}}" if found[name] else f" {{#{name}}}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
 def rewritten(page: str, text: str, root: Path) -> tuple[str, list[str]]:
     """The page with its links changed to the site's, and the repository's files that it links."""
     linked = []
@@ -49,7 +64,7 @@ def rewritten(page: str, text: str, root: Path) -> tuple[str, list[str]]:
         place = os.path.relpath(target, os.path.dirname(page) or ".")
         return f"{match[1]}{place}{'#' + anchor if anchor else ''}{match[3]}"
 
-    parts = CODE.split(text)
+    parts = CODE.split(with_anchors(text))
     return "".join(p if i % 2 else LINK.sub(replace, p) for i, p in enumerate(parts)), linked
 
 

@@ -20,6 +20,13 @@ version="$(sed -n 's/^project(maquette VERSION \([0-9.]*\).*/\1/p' CMakeLists.tx
 epoch="$(git log -1 --format=%ct)"
 dist="$PWD/build/dist"
 work="$PWD/build/dist-work"
+built="$(build/release/stage/bin/maquette info | sed -n 's/.*(commit \(.*\))/\1/p')"
+commit="$(git rev-parse --short=12 HEAD)"
+[ "$built" = "$commit" ] || {
+    echo "build/release is of commit $built ('+': with changes), but HEAD is $commit. Commit changes, run cmake --preset release" \
+        "and make release again." >&2
+    exit 1
+}
 rm -rf "$dist" "$work"
 mkdir -p "$dist" "$work"
 python="${PYTHON:-python3}"
@@ -53,9 +60,9 @@ cp -r build/android/repository "$dist/maven"
 cd "$dist"
 find . -type f -printf '%P\n' | LC_ALL=C sort | xargs -d '\n' sha256sum >"$work/SHA256SUMS"
 mv "$work/SHA256SUMS" .
-minisign -S -s "$key" -m SHA256SUMS -t "Maquette $version, commit $(git rev-parse --short=12 HEAD)"
+minisign -S -s "$key" -m SHA256SUMS -t "Maquette $version, commit $commit"
 du -ah --apparent-size "$dist" | grep -E '\.(whl|gz|deb|aar|minisig)$|SUMS$'
 echo
 [[ "$key" != */TEST-ONLY.key ]] || echo "Signed with the test key: this is not a release. Set MAQ_MINISIGN_KEY."
 echo "Check it: make test-release"
-echo "Tag it:   git tag -a v$version -m 'Maquette $version' $(git rev-parse --short=12 HEAD)"
+echo "Tag it:   git tag -a v$version -m 'Maquette $version' $commit"

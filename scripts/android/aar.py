@@ -118,7 +118,7 @@ def add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 def write_aar(path: Path, classes: Path, native: dict[str, list[Path]]) -> None:
     """docs: developer.android.com/studio/projects/android-library, "Anatomy of an AAR file"."""
-    with zipfile.ZipFile(path, "w+") as aar:
+    with zipfile.ZipFile(path, "w") as aar:
         add(aar, "AndroidManifest.xml", manifest().encode())
         add(aar, "classes.jar", jar_of(classes))
         add(aar, "R.txt", b"")  # no resources
@@ -133,6 +133,7 @@ def write_aar(path: Path, classes: Path, native: dict[str, list[Path]]) -> None:
         add(aar, "META-INF/licenses/maquette/LICENSE", (ROOT / "LICENSE").read_bytes())
         for file in sorted(p for p in (ROOT / "sdk/licenses").rglob("*") if p.is_file()):
             add(aar, f"META-INF/licenses/{file.relative_to(ROOT / 'sdk/licenses')}", file.read_bytes())
+    with zipfile.ZipFile(path, "a") as aar:
         hashes = {name: hashlib.sha256(aar.read(name)).hexdigest() for name in aar.namelist()}
         add(aar, "META-INF/sbom/maquette.cdx.json", sbom.text_of("maquette-android", hashes).encode())
 

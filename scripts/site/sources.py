@@ -44,7 +44,7 @@ def with_anchors(text: str) -> str:
             found[name] = found.get(name, -1) + 1
             line += f" {{#{name}-{found[name]}}}" if found[name] else f" {{#{name}}}"
         lines.append(line)
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + text[len(text.rstrip("\n")) :]
 
 
 def rewritten(page: str, text: str, root: Path) -> tuple[str, list[str]]:

@@ -20,7 +20,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = tomllib.loads(Path(__file__).with_name("libraries.toml").read_text())["library"]
-NOT_LISTED = re.compile(r".*\.dist-info/RECORD|.*\.cdx\.json|DEBIAN/.*")  # they depend on the list, or are no files of it
+NOT_LISTED = re.compile(
+    r".*\.dist-info/RECORD|.*\.cdx\.json|DEBIAN/.*"
+)  # they depend on the list, or are no files of it
 
 
 def output_of(*command: str) -> str:

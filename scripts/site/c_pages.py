@@ -155,7 +155,7 @@ class Pages:
         return " ".join(self.linked(re.sub(r"([*<\[|])", r"\\\1", text), header).split())
 
     def members(self, item: Item) -> list[str]:
-        """The public members of a class, as the header has them, without bodies."""
+        """The public members of a class, in the order of the header, without bodies."""
         lines = []
         for member in item.members:
             if member.kind == "friend":

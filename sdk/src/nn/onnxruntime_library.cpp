@@ -37,8 +37,8 @@ void* find_library(const std::string& explicit_path, std::string* opened_path) {
     return library;
   }
   const std::string folder = library_folder();
-  for (const std::string& path : {module_path(kFileName), folder + kFileName, std::string(kFileName),
-                                  std::string(MAQ_ONNXRUNTIME_SONAME)}) {
+  for (const std::string& path :
+       {module_path(kFileName), folder + kFileName, std::string(kFileName), std::string(MAQ_ONNXRUNTIME_SONAME)}) {
     if (void* library = open_library(path).library) {
       *opened_path = path;
       return library;

@@ -21,10 +21,10 @@ def test_every_page_that_the_site_links_is_copied(tmp_path):
 
 
 def test_links_lead_to_the_pages_of_headers_code_and_folders():
-    text = "[a](../../sdk/include/maquette) [b](../../tests/consumers/people.c) [c](link.md#ship-it) [d](../../cmake)"
+    text = "[a](../../sdk/include/maquette) [b](../../examples/c/people.c) [c](link.md#ship-it) [d](../../cmake)"
     changed, linked = sources.rewritten("docs/guide/dense-pose.md", text, ROOT)
-    assert changed == "[a](../../api/c/README.md) [b](../../tests/consumers/people.c.md) [c](link.md#ship-it) [d](#)"
-    assert linked == ["tests/consumers/people.c", "docs/guide/link.md"]
+    assert changed == "[a](../../api/c/README.md) [b](../../examples/c/people.c.md) [c](link.md#ship-it) [d](#)"
+    assert linked == ["examples/c/people.c", "docs/guide/link.md"]
 
 
 def test_comments_become_doxygen_s_with_their_text_unchanged():

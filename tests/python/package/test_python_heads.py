@@ -326,7 +326,7 @@ def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
         (lambda b, h, r: maquette.HeadBuilder("nowhere"), maquette.MaquetteError, "nowhere.*MAQ_ERROR_NOT_FOUND"),
         (lambda b, h, r: maquette.HeadBuilder(thread=1), TypeError, "no field thread; it has .*texture_px"),
         (lambda b, h, r: maquette.HeadBuilder(ROUND, True, texture_px=100), maquette.MaquetteError, "texture_px"),
-        (lambda b, h, r: maquette.HeadBuilder(ROUND, False, texture_px=512), maquette.MaquetteError, "HEAD_TEXTURE_OFF"),
+        (lambda b, h, r: maquette.HeadBuilder(ROUND, False, texture_px=512), maquette.MaquetteError, "TEXTURE_OFF"),
         (lambda b, h, r: b.add_photo(GREY, (5, 5, 5, 9)), maquette.MaquetteError, "box .* empty"),
         (lambda b, h, r: b.add_photo(GREY, (np.nan, 5, 50, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),
         (lambda b, h, r: b.add_photo(GREY, (400, 5, 500, 90)), maquette.MaquetteError, "MAQ_ERROR_INVALID_ARGUMENT"),

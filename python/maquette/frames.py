@@ -128,6 +128,9 @@ class Frame(NativeObject):
         description.format, description.timestamp_ns = int(format), timestamp_ns
         description.height_px, description.width_px = array.shape[:2]
         if intrinsics is not None:
+            if not isinstance(intrinsics, Intrinsics):
+                wanted = "a maquette.Intrinsics, such as Intrinsics.centred(640, 480, fov_deg=60)"
+                raise TypeError(f"intrinsics is {intrinsics!r}; it is {wanted}.")
             intrinsics.write_to(description.intrinsics)
         description.planes[0] = n.ffi.cast("const uint8_t *", n.ffi.from_buffer(self._pixels))
         wrap, release = "maq_frame_wrap", "maq_frame_release"

@@ -43,6 +43,8 @@ def test_depth_is_read_from_doubles_and_files(tmp_path):
     assert read.intrinsics == camera
     with pytest.raises(FileNotFoundError, match="nowhere"):
         maquette.Frame.open("nowhere.png", depth_unit_m=0.001)
+    with pytest.raises(TypeError, match=r"intrinsics is 60; it is a maquette.Intrinsics"):
+        maquette.Frame(depth, intrinsics=60)
 
 
 def test_a_frame_is_an_array(rgb):

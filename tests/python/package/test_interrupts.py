@@ -119,5 +119,8 @@ def test_errors_and_results_are_pickled_and_objects_say_that_they_are_not():
     assert copied.people == result.people
     with pytest.raises(maquette.MaquetteError, match="only its arrays"):
         copied.save("nowhere")
+    boxes = maquette.Source("stub:solids?scene=box&noise=none&size=320x240&seed=1")
+    edges = maquette.Edges(threads=1).run(boxes.read(), curves=True)
+    assert repr(pickle.loads(pickle.dumps(edges)).curves.boxes) == repr(edges.curves.boxes)
     with pytest.raises(TypeError, match="cannot be pickled or copied"):
         copy.deepcopy(model)

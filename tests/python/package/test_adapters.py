@@ -130,5 +130,5 @@ def test_the_node_of_comfyui_makes_hints_and_masks(result, frame):
     assert hints.shape == (2, 240, 320, 3)
     assert masks.shape == (2, 240, 320)
     expected = visualize(maquette.DensePose().run(frame.pixels()))
-    assert np.array_equal((hints[1].numpy() * 255).round().astype(np.uint8), expected)
+    assert np.array_equal((hints[0].numpy() * 255).round().astype(np.uint8), expected)
     assert np.array_equal(masks[0].numpy() > 0, expected.any(-1))

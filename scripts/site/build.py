@@ -22,7 +22,7 @@ WORK = ROOT / "build/site-work"
 PAGES = WORK / "pages"
 SITE = ROOT / "build/site"
 PROJECT = ["ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md", "CHANGELOG.md"]
-FOLDERS = ["python/README.md", "android/README.md", "sdk/README.md"]
+FOLDERS = ["python/README.md", "android/README.md", "sdk/README.md", "examples/README.md"]
 DOXYGEN = """
 INPUT = sdk/include/maquette
 FILE_PATTERNS = *.h *.hpp
@@ -57,21 +57,26 @@ def write_c_pages() -> None:
 
 
 def write_python_pages() -> None:
-    """One page a module with public names; the names are those that the package exports."""
+    """One page a module: with the names that the package exports, or with all names."""
     package = ROOT / "python/maquette"
-    imports = re.findall(
-        r"^from maquette\.(\w+) import (\([^)]*\)|.*)$", (package / "__init__.py").read_text(), re.MULTILINE
-    )
+    text = (package / "__init__.py").read_text()
+    exported = set(re.findall(r'"(\w+)"', text.split("__all__ = [")[1].split("]")[0]))
+    modules = {}
+    for module, names in re.findall(r"^from maquette\.(\w+) import (\([^)]*\)|.*)$", text, re.MULTILINE):
+        modules[module] = sorted(exported.intersection(re.findall(r"\w+", names)))
+    for path in [package / "settings.py", *sorted(package.glob("adapters/[!_]*.py"))]:
+        names = re.findall(r"^(?:class|def) ([A-Za-z]\w*)|^([A-Z]\w+) = ", path.read_text(), re.MULTILINE)
+        modules[".".join(path.relative_to(package).with_suffix("").parts)] = ["".join(name) for name in names]
     folder = PAGES / "api/python"
     folder.mkdir(parents=True)
     rows = []
-    for module, names in imports:
-        public = [name for name in re.findall(r"\w+", names) if not name.startswith("_")]
-        text = "\n\n".join(f"::: maquette.{module}.{name}" for name in public)
+    for module, names in modules.items():
+        text = "\n\n".join(f"::: maquette.{module}.{name}" for name in names)
         (folder / f"{module}.md").write_text(f"# maquette.{module}\n\n{text}\n")
-        rows.append(f"| [maquette.{module}]({module}.md) | {', '.join(f'`{name}`' for name in public)} |")
-    head = "# Python API\n\nAll names are in the package `maquette`. [How to install it](../../python/README.md).\n\n"
-    (folder / "README.md").write_text(head + "| module | names |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+        rows.append(f"| [maquette.{module}]({module}.md) | {', '.join(f'`{name}`' for name in names)} |")
+    head = "# Python API\n\nThe package `maquette` exports all names but those of `settings` and `adapters`. "
+    head += "[How to install it](../../python/README.md).\n\n| module | names |\n| --- | --- |\n"
+    (folder / "README.md").write_text(head + "\n".join(rows) + "\n")
 
 
 def write_kotlin_pages(is_left_out: bool) -> None:
@@ -90,7 +95,8 @@ def write_kotlin_pages(is_left_out: bool) -> None:
 def navigation() -> list:
     def titled(folder: str) -> list:
         pages = sorted((PAGES / folder).rglob("*.md"), key=lambda page: page.with_suffix(""))
-        return [page.relative_to(PAGES).as_posix() for page in pages]
+        names = [page.relative_to(PAGES).as_posix() for page in pages]
+        return [name for name in names if name.startswith("api/") or (ROOT / name).is_file()]  # no pages of code
 
     def reference(folder: str) -> list:
         pages = [path for path in titled(folder) if not path.endswith("README.md")]

@@ -64,11 +64,18 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 test-glb: build  ## heads as .glb by the Khronos validator; needs node and npm; not part of `test-all`
 	@scripts/test-glb.sh
 
-FUZZ_SECONDS ?= 60
+FUZZ_SECONDS ?= 600
 .PHONY: fuzz
-fuzz: packages-test  ## files of heads that nobody would write, FUZZ_SECONDS of each kind, with AddressSanitizer; not part of `test-all`
+fuzz: packages-fuzz  ## each fuzz target for FUZZ_SECONDS (libFuzzer, sanitizers), one on each core; a few seconds of each are in `test-all`
 	@JOBS=$(JOBS) scripts/build.sh fuzz
-	@tests/native/fuzz/run.sh $(FUZZ_SECONDS)
+	@tests/native/fuzz/run.sh $(FUZZ_SECONDS) $(JOBS) $(FUZZ_TARGETS)
+
+SOAK_SECONDS ?= 600
+.PHONY: soak
+soak: build packages-test  ## all systems in one process for SOAK_SECONDS; memory, files, threads and times in build/soak/soak.svg
+	@scripts/make-venv.sh
+	@JOBS=$(JOBS) scripts/build.sh release -DMAQ_BUILD_TESTS=ON soak
+	@.venv/bin/python -m tests.soak --seconds $(SOAK_SECONDS)
 
 .PHONY: android
 android: build  ## the AAR for Android apps with its size report, into build/android; without the NDK, as a check (android/README.md)
@@ -138,8 +145,8 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-desktop packages-test packages-lint packages-test-all
-packages-demo packages-desktop packages-test packages-lint: packages-%:
+.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-test-all
+packages-demo packages-desktop packages-test packages-lint packages-fuzz: packages-%:
 	@scripts/install-packages.sh $*
 
 packages-test-all:  # a group whose packages cannot be installed prints why it is not run

@@ -7,6 +7,7 @@
 #   scripts/install-packages.sh isa         + to build for aarch64 and to run other processors' programs (70 MB)
 #   scripts/install-packages.sh camera-vm   + a virtual machine with Linux's test camera drivers (35 MB)
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
+#   scripts/install-packages.sh fuzz        + Clang with libFuzzer (test, too)
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
@@ -16,11 +17,11 @@
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,16s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,17s/^# \{0,1\}//p' "$0"; }
 
 for group in "${@:-}"; do
     case "$group" in
-        demo | desktop | test | isa | camera-vm | lint | android | newcomer | release | site) ;;
+        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | release | site) ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac
@@ -63,12 +64,12 @@ needs_package ca-certificates
 # make-venv.sh needs a Python that can create environments.
 "${PYTHON:-python3}" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3-venv)
 
-if wants desktop test isa camera-vm lint android newcomer; then
+if wants desktop test isa camera-vm lint fuzz android newcomer; then
     needs_package libglfw3-dev
     needs_package libepoxy-dev
     needs_package libimgui-dev
 fi
-if wants test isa camera-vm lint android newcomer; then
+if wants test isa camera-vm lint fuzz android newcomer; then
     needs_command git git
     needs_command ccache ccache       # what was compiled in another checkout is not compiled again
     needs_command assimp assimp-utils  # a reader of heads that is not ours
@@ -101,10 +102,12 @@ if wants lint; then
     needs_command clang-format clang-format
     needs_command clang-tidy clang-tidy
 fi
+if wants fuzz android; then
+    needs_command clang++-14 clang-14  # with libFuzzer
+fi
 if wants android; then
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Kotlin, and Android's classes to test against
-    needs_command clang++-14 clang-14
     needs_command ld.lld-14 lld-14
     needs_package libc++-14-dev       # headers; the library is Android's
     needs_command unzip unzip

@@ -42,13 +42,15 @@ class Curve:
 class Box:
     """size_m: float64 [3], lengths of the sides, the longest first. size_tolerance_m: float64 [3], two standard
     deviations of each length. axes: float64 [3, 3], one row for each side. centre_m: float64 [3]. corner_count: visible
-    corners, at most 8."""
+    corners, at most 8. includes_focal_tolerance: whether size_tolerance_m includes the setting focal_tolerance and
+    does not take the focal length as exact."""
 
     size_m: np.ndarray
     size_tolerance_m: np.ndarray
     axes: np.ndarray
     centre_m: np.ndarray
     corner_count: int
+    includes_focal_tolerance: bool = False
 
     def __repr__(self) -> str:
         sides = (f"{1000 * s:.0f} ± {1000 * t:.0f}" for s, t in zip(self.size_m, self.size_tolerance_m))  # noqa: B905
@@ -80,7 +82,7 @@ class Curves(NativeObject):
         self.boxes = [
             Box(
                 np.array(list(b.size_m)), np.array(list(b.size_tolerance_m)), np.array([list(a) for a in b.axes]),
-                np.array(list(b.centre_m)), b.corner_count,
+                np.array(list(b.centre_m)), b.corner_count, bool(b.includes_focal_tolerance),
             )
             for b in found
         ]  # fmt: skip

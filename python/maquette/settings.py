@@ -134,6 +134,10 @@ class CurvesSettings(TypedDict, total=False):
     skip_boxes: int
     """1: do not search for boxes; default 0."""
 
+    focal_tolerance: float
+    """Two standard deviations of the focal lengths of the frame's intrinsics, as a fraction: 0.01 is 1 %. At most 0.5;
+    0 (default): unknown. The tolerance of boxes includes it."""
+
 
 class EdgesFusionSettings(TypedDict, total=False):
     """Fields of maq_edges_fusion_config."""

@@ -21,6 +21,7 @@ namespace {
 constexpr int64_t kSameRequestNs = 500000000;
 
 std::atomic<int64_t> asked_ns{0};  // when; 0: not yet
+std::atomic<int> asking_signal{0};
 int event = -1;
 
 int64_t now_ns() {
@@ -34,6 +35,8 @@ void handle(int number) {
   const int error = errno;
   const int64_t now = now_ns();
   int64_t first = 0;
+  int none = 0;
+  asking_signal.compare_exchange_strong(none, number);
   if (asked_ns.compare_exchange_strong(first, now)) {
     const uint64_t one = 1;
     [[maybe_unused]] const ssize_t written = write(event, &one, sizeof one);
@@ -79,6 +82,8 @@ void catch_interrupts() {
 }
 
 bool interrupted() { return asked_ns != 0; }
+
+int interrupting_signal() { return asking_signal; }
 
 StoppedByInterrupt::StoppedByInterrupt(const maquette::Source& source) : source_(source.get()) {
   const std::lock_guard<std::mutex> lock(open_sources().mutex);

@@ -6,6 +6,8 @@
 // From now on Ctrl-C, SIGTERM and SIGHUP ask to stop; the next time they end the program at once.
 void catch_interrupts();
 bool interrupted();
+// The first signal that asked; 0 before.
+int interrupting_signal();
 
 // While this lives, a request to stop stops the source: a wait for a frame ends at once.
 class StoppedByInterrupt {

@@ -12,12 +12,14 @@
 #include <string>
 #include <system_error>
 
+#include "interrupt.h"
 #include "print.h"
 
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
+constexpr int kOfSignals = 128;  // added to the number of a signal, as shells do for programs that signals end
 
 // A closed one would be the number of the first file that is opened, and what is printed would go there. Nothing can
 // be written to what takes its place.
@@ -26,6 +28,9 @@ void fill_standard_descriptors() {
     if (fcntl(number, F_GETFD) < 0 && open("/dev/null", O_RDONLY) != number) std::abort();
   }
 }
+
+// Returns the exit code of a run that failed or was cut short.
+int failure() { return interrupted() ? kOfSignals + interrupting_signal() : kFailed; }
 
 // Returns the fault of a word where a command is expected, or ""; CLI11 says only that a command is required.
 std::string unknown_command(const CLI::App& app, int argc, char** argv) {
@@ -80,7 +85,7 @@ int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
   try {
     const int result = parse(app, argc, argv, exit_code);
     flush_output();
-    return result;
+    return result == kFailed ? failure() : result;
   } catch (const std::exception& error) {
     return report(error);
   }
@@ -95,5 +100,5 @@ int report(const std::exception& error) {
   }
   std::fflush(stdout);  // what was found before stands above the error also where both go to one file
   print_error("maquette: %s\n", printable(text).c_str());
-  return kFailed;
+  return failure();
 }

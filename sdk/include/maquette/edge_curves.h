@@ -24,8 +24,10 @@ typedef struct maq_edges_curves maq_edges_curves;
 /* Settings of the curve search. The defaults suit all cameras and scenes, because lengths are in pixels. */
 typedef struct maq_edges_curves_config {
   uint32_t struct_size;
-  float min_length_px; /* shorter curves are dropped, 4 to 1e6; 0 (default): 10 */
-  int32_t skip_boxes;  /* 1: do not search for boxes; default 0 */
+  float min_length_px;   /* shorter curves are dropped, 4 to 1e6; 0 (default): 10 */
+  int32_t skip_boxes;    /* 1: do not search for boxes; default 0 */
+  float focal_tolerance; /* two standard deviations of the focal lengths of the frame's intrinsics, as a fraction: 0.01
+                            is 1 %. At most 0.5; 0 (default): unknown. The tolerance of boxes includes it. */
 } maq_edges_curves_config;
 
 typedef enum maq_edges_curve_type {
@@ -79,9 +81,12 @@ typedef struct maq_edges_box {
   uint32_t struct_size;
   int32_t corner_count;       /* visible corners, at most 8 */
   double size_m[3];           /* lengths of the sides, the longest first */
-  double size_tolerance_m[3]; /* two standard deviations of each length, from the fit and the spread of its edges */
+  double size_tolerance_m[3]; /* two standard deviations of each length, from the fit and the spread of its edges and
+                                 from focal_tolerance */
   double axes[3][3];          /* directions of the sides, length 1, at right angles */
   double centre_m[3];
+  int32_t includes_focal_tolerance; /* 1: size_tolerance_m includes focal_tolerance; 0: that is unknown, and the
+                                       tolerance is too small if the intrinsics are wrong */
 } maq_edges_box;
 
 typedef enum maq_edges_snap_target {

@@ -76,6 +76,8 @@ typedef struct maq_edges_stats {
   int32_t threads;              /* threads of the network; fewer if the system starts no more (see the log) */
   int32_t is_threads_measured;  /* 1: MAQ_THREADS_MEASURED chose the number of threads */
   int64_t averaged_pixel_count; /* pixels with the mean depth of several frames (average_frames) */
+  int64_t far_pixel_count; /* pixels with depth beyond 50 m. If they are more than half of the known ones, the unit of
+                              the depth is probably wrong, and maq_edges_run logs a warning once. */
 } maq_edges_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_edges_config) of the caller.

@@ -135,7 +135,7 @@ void maq_frame_release(maq_frame* frame) {
     const maq_frame_release_callback callback = std::exchange(taken->release_callback, nullptr);
     void* const user_data = taken->user_data;
     return_to_pool(taken);
-    if (callback != nullptr) callback(user_data);
+    if (callback != nullptr) call_app("release_callback", [&] { callback(user_data); });
   });
 }
 

@@ -12,9 +12,6 @@ namespace {
 
 constexpr uint32_t kDefaultPoolSize = 4, kMaxPoolSize = 64;
 
-// Texts for the calling thread, like the text of maq_last_error.
-thread_local std::string given_problem, given_uri;
-
 using ResultPool = BoundedPool<maq_pipeline_result>;
 
 maq_pipeline_config default_pipeline_config() {
@@ -66,13 +63,14 @@ PipelineSettings pipeline_settings(const maq_pipeline_config& config, const std:
       }
       std::swap(result->frame.frame, frame);
       result->output.swap(output);
-      call(user_data, lend_result(std::move(result), times));
+      maq_pipeline_result* const lent = lend_result(std::move(result), times);
+      call_app("config.result_callback", [&] { call(user_data, lent); });
       return true;
     };
   }
   if (config.state_callback != nullptr) {
     settings.on_state = [call = config.state_callback, user_data = config.state_user_data](const PipelineStatus& now) {
-      call(user_data, now.state, now.status, now.problem.c_str());
+      call_app("config.state_callback", [&] { call(user_data, now.state, now.status, now.problem.c_str()); });
     };
   }
   return settings;
@@ -205,9 +203,13 @@ maq_status maq_pipeline_get_info(const maq_pipeline* pipeline, maq_pipeline_info
   return guarded(pipeline, __func__, [&] {
     require_argument(pipeline, "pipeline");
     PipelineStatus now = pipeline->pipeline.status();
-    given_problem = std::move(now.problem);
-    given_uri = pipeline->pipeline.source_uri();
-    write_struct(info, "info", maq_pipeline_info{0, now.state, now.status, given_problem.c_str(), given_uri.c_str()});
+    ThreadTexts* const texts = thread_texts();
+    if (texts == nullptr) throw std::bad_alloc();
+    texts->pipeline_problem = std::move(now.problem);
+    texts->pipeline_uri = pipeline->pipeline.source_uri();
+    write_struct(
+        info, "info",
+        maq_pipeline_info{0, now.state, now.status, texts->pipeline_problem.c_str(), texts->pipeline_uri.c_str()});
     return MAQ_OK;
   });
 }

@@ -19,6 +19,16 @@ class ArgumentError : public Error {
   explicit ArgumentError(const Parts&... parts) : Error(MAQ_ERROR_INVALID_ARGUMENT, parts...) {}
 };
 
+// The texts that calls gave to a thread, so that no call waits for another and no text is freed while it is read.
+struct ThreadTexts {
+  std::string latest_error, returned_error;
+  std::string pipeline_problem, pipeline_uri;  // of maq_pipeline_get_info
+};
+
+// Returns the texts of this thread; NULL where there is no memory for them. A thread_local object would end the process
+// there: glibc cannot register its destructor.
+ThreadTexts* thread_texts() noexcept;
+
 // Keeps the text for maq_last_error: as the thread's latest, and with the handle unless that is NULL. `function`
 // begins the text when it is not NULL.
 maq_status keep_error(const Handle* handle, maq_status status, const char* function, const char* text) noexcept;
@@ -103,6 +113,20 @@ void destroy(T* handle, const char* name, const char* function,
              WhileInUse while_in_use = WhileInUse::kRefused) noexcept {
   return_handle(
       handle, name, function, [](T* taken) { delete taken; }, while_in_use);
+}
+
+// Calls a function of the app, which must not throw. An exception that it throws in spite of this is the app's error.
+template <class Call>
+auto call_app(const char* name, Call&& call) {
+  try {
+    return call();
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw ArgumentError(name, " threw an exception (", error.what(), "); functions that the library calls must not.");
+  } catch (...) {
+    throw ArgumentError(name, " threw an exception; functions that the library calls must not.");
+  }
 }
 
 // `name`: a text, also a std::string.

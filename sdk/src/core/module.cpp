@@ -56,6 +56,11 @@ LibraryOpening open_library(const std::string& path) {
     const auto says = [&](const char* text) { return opening.error.find(text) != std::string::npos; };
     // glibc says the same of a file system whose programs may not run, and leaves no errno.
     if (says("failed to map segment")) require_memory(kLargestLibraryBytes);
+    if (says("Too many open files")) {
+      throw Error(MAQ_ERROR_OUT_OF_MEMORY, path,
+                  " cannot be opened: the process or the system has too many open files. ",
+                  "Close some, or raise the limit (ulimit -n).");
+    }
     // Which is not of the process's memory: too many libraries with thread-local storage were opened.
     const bool is_static_storage = says("static TLS block");
     const bool is_told = says_out_of_memory(opening.error) && !is_static_storage;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/memory.h"
 
 namespace maq {
 
@@ -18,6 +19,7 @@ namespace maq {
 // more threads, or no memory for one.
 template <class Body>
 std::thread start_thread(const char* name, Body&& body) {
+  require_memory(kThreadLocalBytes);  // glibc ends the process where it has none for a new thread's storage
   try {
     std::thread thread(std::forward<Body>(body));
     pthread_setname_np(thread.native_handle(), name);

@@ -2,37 +2,29 @@
 
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "core/files/atomic_file.h"
-#include "core/memory.h"
+#include "core/json/json_text.h"
 #include "image/files/image_file.h"
 
 namespace maq {
 namespace {
 
-constexpr size_t kMaxJsonBytes = 256 << 10;
-
 // Coordinates have a hundredth of a pixel and scores four digits, without the noise of converting floats to text.
 double rounded(double value, double steps) { return std::round(value * steps) / steps; }
 
 std::string json_of(const DensePoseResult& result) {
-  // Where a few bytes fail, the JSON library ends the process.
-  require_memory(kMaxJsonBytes);
-  nlohmann::ordered_json document;
-  document["width"] = result.planes.width_px;
-  document["height"] = result.planes.height_px;
-  document["people"] = nlohmann::json::array();
+  JsonText json;
+  json.begin_object().member("width", result.planes.width_px).member("height", result.planes.height_px);
+  json.key("people").begin_list();
   for (const Person& person : result.people) {
-    nlohmann::ordered_json entry;
-    entry["box"] = nlohmann::json::array();
+    json.begin_object().key("box").begin_list();
     for (const float edge : {person.box.x0, person.box.y0, person.box.x1, person.box.y1}) {
-      entry["box"].push_back(rounded(double(edge), 100));
+      json.value(rounded(double(edge), 100));
     }
-    entry["score"] = rounded(double(person.score), 10000);
-    document["people"].push_back(entry);
+    json.end_list().member("score", rounded(double(person.score), 10000)).end_object();
   }
-  return document.dump() + "\n";
+  return json.end_list().end_object().text() + "\n";
 }
 
 ImageView view_of(maq_pixel_format format, const DensePlanes& planes, const uint8_t* pixels) {

@@ -107,6 +107,7 @@ void Edges::find_field(const ImageView& depth, EdgesResult& result) {
   });
   stats.averaged_pixels = average_.add(field.depth_m.data(), field.intrinsics, threads_);
   stats.known_pixels = std::count_if(field.depth_m.begin(), field.depth_m.end(), [](float z) { return z > 0; });
+  stats.far_pixels = std::count_if(field.depth_m.begin(), field.depth_m.end(), [](float z) { return z > kFarDepthM; });
   stats.depth_ms = float(stage.lap_ms());
 
   const DepthPlane plane{field.depth_m.data(), field.width, field.height};

@@ -23,6 +23,8 @@ struct EdgesSettings {
   int average_frames = 1;
 };
 
+inline constexpr float kFarDepthM = 50;  // few cameras see farther: depth beyond it is mostly of a wrong unit
+
 struct EdgesStats {
   float depth_ms = 0;   // convert depth to metres, and average it with earlier frames
   float skip_ms = 0;    // find the window for the network
@@ -34,6 +36,7 @@ struct EdgesStats {
   int64_t network_pixels = 0;   // pixels the network ran on
   int64_t broken_pixels = 0;    // pixels with NaN from the network
   int64_t averaged_pixels = 0;  // pixels whose depth is the mean of several frames
+  int64_t far_pixels = 0;       // pixels beyond kFarDepthM
   maq_provider provider = MAQ_PROVIDER_CPU;
   int threads = 1;
   bool is_threads_measured = false;

@@ -1,11 +1,10 @@
 #include "edges/field_files.h"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/files/atomic_file.h"
-#include "core/memory.h"
+#include "core/json/json_text.h"
 #include "image/files/file_codecs.h"
 #include "image/files/image_file.h"
 
@@ -13,20 +12,15 @@ namespace maq {
 namespace {
 
 constexpr double kUnit_r = 0.001;  // of a stored 1
-constexpr size_t kMaxFieldJsonBytes = 4 << 10;
 
 std::string json_of(const EdgeField& field) {
-  // The JSON library ends the process when an allocation fails.
-  require_memory(kMaxFieldJsonBytes);
   const Intrinsics& camera = field.intrinsics;
-  nlohmann::ordered_json document;
-  document["width"] = field.width;
-  document["height"] = field.height;
-  document["distance_unit_r"] = kUnit_r;
-  document["eps_r"] = double(field.eps_r);
-  document["intrinsics"] = {
-      {"fx_px", camera.fx_px}, {"fy_px", camera.fy_px}, {"cx_px", camera.cx_px}, {"cy_px", camera.cy_px}};
-  return document.dump(2) + "\n";
+  JsonText json(2);
+  json.begin_object().member("width", field.width).member("height", field.height).member("distance_unit_r", kUnit_r);
+  json.member("eps_r", double(field.eps_r)).key("intrinsics").begin_object();
+  json.member("fx_px", camera.fx_px).member("fy_px", camera.fy_px);
+  json.member("cx_px", camera.cx_px).member("cy_px", camera.cy_px);
+  return json.end_object().end_object().text() + "\n";
 }
 
 std::vector<uint8_t> distance_png(const EdgeField& field) {

@@ -4,13 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "core/json/json_value.h"
 
 namespace maq {
 
@@ -47,19 +47,19 @@ class ManifestNode {
     for (size_t i = 0; i < count; ++i) result[i] = nodes[i].number(min, max);
     return result;
   }
-  bool is_text() const { return value_->is_string(); }
+  bool is_text() const { return value_->text() != nullptr; }
 
  private:
   struct Document {
-    nlohmann::json root;
+    JsonValue root;
     std::string origin;
   };
 
-  ManifestNode(std::shared_ptr<const Document> document, const nlohmann::json& value, std::string path)
+  ManifestNode(std::shared_ptr<const Document> document, const JsonValue& value, std::string path)
       : document_(std::move(document)), value_(&value), path_(std::move(path)) {}
 
   std::shared_ptr<const Document> document_;
-  const nlohmann::json* value_;  // in the document
+  const JsonValue* value_;  // in the document
   std::string path_;
 };
 

@@ -2,7 +2,15 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <iostream>
+#include <mutex>
+#include <new>
+#include <streambuf>
+#include <string_view>
+#include <thread>
 #include <vector>
 
 #include "core/error.h"
@@ -51,6 +59,42 @@ void* find_library(const std::string& explicit_path, std::string* opened_path) {
 // The memory for the schemas of operators; without it, ONNX prints.
 constexpr size_t kEnvironmentBytes = size_t(24) << 20;
 
+// Keeps what a thread writes to std::cerr, for which it takes no memory; other threads write on. ONNX prints the
+// failures of its schemas there.
+class CapturedErrors : public std::streambuf {
+ public:
+  // Runs `call` and returns the beginning of its text. Not for two threads at once.
+  template <class Call>
+  static std::string_view of(Call&& call) {
+    static auto* const captured = new CapturedErrors;  // stays: another thread may be writing through it
+    captured->thread_ = std::this_thread::get_id();
+    captured->size_ = 0;
+    captured->before_ = std::cerr.rdbuf(captured);
+    call();
+    std::cerr.rdbuf(captured->before_);
+    return {captured->text_.data(), captured->size_};
+  }
+
+ protected:
+  int_type overflow(int_type character) override {
+    const char one = traits_type::to_char_type(character);
+    return xsputn(&one, 1) == 1 ? character : traits_type::eof();
+  }
+  std::streamsize xsputn(const char* text, std::streamsize count) override {
+    if (std::this_thread::get_id() != thread_) return before_ == nullptr ? 0 : before_->sputn(text, count);
+    const size_t kept = std::min(size_t(count), text_.size() - size_);
+    std::copy_n(text, kept, text_.begin() + ptrdiff_t(size_));
+    size_ += kept;
+    return count;
+  }
+
+ private:
+  std::thread::id thread_;
+  std::streambuf* before_ = nullptr;
+  std::array<char, 500> text_{};
+  size_t size_ = 0;
+};
+
 // ONNX Runtime has one environment for a process, whose logger is the one of the first caller and may be gone by the
 // time it is called; sessions have loggers of their own (session.cpp), so this one only keeps it from printing.
 void ORT_API_CALL discard_log(void*, OrtLoggingLevel, const char*, const char*, const char*, const char*) {}
@@ -76,7 +120,7 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
   // overwrite a choice that the process already made.
   setenv("ORT_DISABLE_TELEMETRY", "1", 0);
 
-  // Never closed again: the library's threads and thread-local storage do not survive unloading.
+  // Not closed again once it started: its threads and thread-local storage do not survive unloading.
   library_ = find_library(explicit_path, &path_);
   const auto get_api_base = reinterpret_cast<const OrtApiBase* (*)()>(symbol("OrtGetApiBase"));
   if (get_api_base == nullptr) {
@@ -91,10 +135,28 @@ OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const L
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path_, " is ONNX Runtime ", version_, ", but 1.", kApiVersion,
                 ".0 or newer is needed.", kRemedy);
   }
-  require_memory(kEnvironmentBytes);
-  check(api_->CreateEnvWithCustomLogger(discard_log, nullptr, ORT_LOGGING_LEVEL_WARNING, "maquette", &env_),
-        MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime does not start");
+  start();
   log_.write(MAQ_LOG_INFO, "ONNX Runtime ", version_, " opened from ", path_);
+}
+
+void OnnxRuntimeLibrary::start() {
+  static std::mutex mutex;
+  const std::lock_guard<std::mutex> lock(mutex);
+  try {
+    require_memory(kEnvironmentBytes);
+    OrtStatus* status = nullptr;
+    const std::string_view printed = CapturedErrors::of([&] {
+      status = api_->CreateEnvWithCustomLogger(discard_log, nullptr, ORT_LOGGING_LEVEL_WARNING, "maquette", &env_);
+    });
+    if (!printed.empty()) log_.write(MAQ_LOG_WARNING, "ONNX Runtime printed while it started: ", printed);
+    check(status, MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime does not start");
+    if (says_out_of_memory(printed)) throw std::bad_alloc();  // it has not all of its operators
+  } catch (...) {
+    // Half started, it would fail at each later start. It has no threads yet, so that it can be closed and opened anew.
+    if (env_ != nullptr) api_->ReleaseEnv(env_);
+    dlclose(library_);
+    throw;
+  }
 }
 
 OnnxRuntimeLibrary::~OnnxRuntimeLibrary() {

@@ -37,6 +37,8 @@ class OnnxRuntimeLibrary {
   void check(OrtStatus* result, maq_status status, const std::string& what) const;
 
  private:
+  void start();
+
   Log log_;
   void* library_ = nullptr;
   const OrtApi* api_ = nullptr;

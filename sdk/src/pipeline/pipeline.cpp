@@ -163,10 +163,8 @@ struct Pipeline::State {
     while (wait_for_work()) {
       try {
         if (!report_a_change()) step();
-      } catch (const std::exception&) {
-        fail(current_failure());
       } catch (...) {
-        fail({MAQ_ERROR_INTERNAL, "A callback of the pipeline threw an exception; callbacks must not throw."});
+        fail(current_failure());
       }
     }
     close_source();
@@ -219,8 +217,13 @@ struct Pipeline::State {
     maq_pipeline_state at = MAQ_PIPELINE_STOPPED;
     {
       std::lock_guard<std::mutex> lock(mutex);
-      if (request_number != heard_number) now = request;
-      heard_number = request_number;
+      if (request_number != heard_number) {
+        heard_number = request_number;
+        // Before what may fail: a failure is one of this request, and not of an earlier one.
+        now.source_number = request.source_number;
+        now.model_number = request.model_number;
+        now = request;
+      }
       at = phase;
     }
     if (at == MAQ_PIPELINE_FAILED) return;

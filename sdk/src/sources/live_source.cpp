@@ -79,9 +79,12 @@ struct LiveSource::State {
     if (settings.on_state == nullptr || !begin_report()) return;
     try {
       settings.on_state(settings.user_data, state, reason.c_str());
+    } catch (const std::exception& error) {
+      end_report();
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "its state callback threw an exception (", error.what(), ")");
     } catch (...) {
       end_report();
-      throw;
+      throw Error(MAQ_ERROR_INVALID_ARGUMENT, "its state callback threw an exception");
     }
     end_report();
   }
@@ -203,10 +206,8 @@ struct LiveSource::State {
   void run(std::shared_ptr<Camera> camera) noexcept {
     try {
       stream(camera);
-    } catch (const std::exception&) {
-      fail_by(current_failure());
     } catch (...) {
-      fail_by({MAQ_ERROR_DEVICE_LOST, "its state callback threw an exception"});
+      fail_by(current_failure());
     }
     show(nullptr);
     if (camera != nullptr) camera->close();

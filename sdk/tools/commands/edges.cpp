@@ -32,6 +32,7 @@ struct EdgesOptions {
   bool json = false;
   bool skip_planes = false;
   int average = 0;
+  double focal_tolerance_percent = 0;
   FrameLimits limits;
 };
 
@@ -60,6 +61,7 @@ FoundCurves find_curves(const EdgesOptions& options, const maquette::EdgesResult
   if (options.formats.empty() && !options.boxes && !options.overlay) return found;
   maq_edges_curves_config config = maquette::default_edges_curves_config();
   config.skip_boxes = options.boxes ? 0 : 1;
+  config.focal_tolerance = float(options.focal_tolerance_percent / 100);
   found.all = result.find_curves(config);
   found.curves = found.all->curves();
   found.corners = found.all->corners();
@@ -68,7 +70,10 @@ FoundCurves find_curves(const EdgesOptions& options, const maquette::EdgesResult
 }
 
 nlohmann::ordered_json describe(const maq_edges_box& box) {
-  return {{"size_m", box.size_m}, {"size_tolerance_m", box.size_tolerance_m}, {"corners", box.corner_count}};
+  return {{"size_m", box.size_m},
+          {"size_tolerance_m", box.size_tolerance_m},
+          {"includes_focal_tolerance", box.includes_focal_tolerance != 0},
+          {"corners", box.corner_count}};
 }
 
 std::string text_of(const maq_edges_box& box) {
@@ -79,7 +84,7 @@ std::string text_of(const maq_edges_box& box) {
                   1e3 * box.size_tolerance_m[i]);
     text += side;
   }
-  return text + " mm";
+  return text + (box.includes_focal_tolerance != 0 ? " mm" : " mm if the focal length is exact");
 }
 
 void print_frame(const EdgesOptions& options, const std::string& stem, const maq_frame_desc& desc,
@@ -105,6 +110,7 @@ void print_frame(const EdgesOptions& options, const std::string& stem, const maq
                                  {"network_pixels", stats.network_pixel_count},
                                  {"broken_pixels", stats.broken_pixel_count},
                                  {"averaged_pixels", stats.averaged_pixel_count},
+                                 {"far_pixels", stats.far_pixel_count},
                                  {"provider", name_of(stats.provider)},
                                  {"threads", stats.threads},
                                  {"threads_measured", stats.is_threads_measured != 0},
@@ -209,6 +215,10 @@ void add_edges_command(CLI::App& app, int* exit_code) {
       ->check(CLI::IsMember({"json", "obj", "ply", "dxf", "step"}))
       ->needs(out);
   command->add_flag("--boxes", options->boxes, "Also measure boxes: print their sizes, and draw them with --overlay");
+  command
+      ->add_option("--focal-tolerance", options->focal_tolerance_percent,
+                   "Uncertainty of the focal length in percent (two standard deviations), for +- of boxes")
+      ->check(CLI::Range(0.0, 50.0));
   command->add_flag("--json", options->json, "Print counts and times as one JSON line per frame");
   add_network_options(*command, options->network, "MAQ_EDGES_BUNDLE");
   command->add_flag("--skip-planes", options->skip_planes,
@@ -231,7 +241,8 @@ void add_edges_command(CLI::App& app, int* exit_code) {
       "written atomically.\n\n"
       "An overlay shows convex creases yellow, concave creases green, boundaries white, corners red. Boxes have their\n"
       "lengths in millimetres. To measure a box, look at it from above, with a corner towards the camera. One edge in\n"
-      "each of its three directions must be visible from corner to corner. +- is two standard deviations.\n\n"
+      "each of its three directions must be visible from corner to corner. +- is two standard deviations. It includes\n"
+      "the error of the focal length with --focal-tolerance alone: 1 for 1 %.\n\n"
       "Depth needs a unit and a calibration. Cameras and recordings have both. For an image, add them to the URI:\n"
       "  depth_unit=0.001      metres of a stored 1 in a 16-bit PNG or TIFF (1 for metres as floats in a TIFF)\n"
       "  fov=60                horizontal field of view in degrees, or fx=, fy=, cx=, cy= in pixels\n\n"

@@ -98,12 +98,16 @@ TEST(ApiFrames, ACallbackThatThrowsEndsNothingAndIsTold) {
   const auto throw_error = [](void*) { throw std::runtime_error("The app's own error."); };
   ASSERT_EQ(maq_frame_wrap(context.get(), &desc, throw_error, nullptr, &frame), MAQ_OK);
   maq_frame_release(frame);
-  EXPECT_STREQ(maq_last_error(nullptr), "maq_frame_release: The app's own error.");
+  EXPECT_STREQ(
+      maq_last_error(nullptr),
+      "maq_frame_release: release_callback threw an exception (The app's own error.); functions that the library "
+      "calls must not.");
   ASSERT_EQ(maq_frame_wrap(
                 context.get(), &desc, [](void*) { throw 5; }, nullptr, &frame),
             MAQ_OK);
   maq_frame_release(frame);
-  EXPECT_STREQ(maq_last_error(nullptr), "maq_frame_release: An unknown exception was thrown.");
+  EXPECT_STREQ(maq_last_error(nullptr),
+               "maq_frame_release: release_callback threw an exception; functions that the library calls must not.");
 }
 
 TEST(ApiFrames, OutliveTheirContextAndSource) {

@@ -494,6 +494,7 @@ TEST_F(ApiHeads, ABundleInMemoryAndAnyNumberOfThreadsGiveTheSame) {
   config.model.bundle_files = files.data();
   config.model.bundle_file_count = uint32_t(files.size());
   config.model.threads = 3;
+  config.texture = MAQ_HEAD_TEXTURE_OFF;  // as in fitted()
   maquette::HeadBuilder in_memory(context, config);
   for (auto& [name, bytes] : contents) bytes.assign(bytes.size(), 'x');
   in_memory.add_photo(frame, known);

@@ -27,16 +27,19 @@ void* __libc_memalign(size_t alignment, size_t size);
 
 namespace {
 
-// Allocations of so many bytes until one fails. ONNX Runtime's own are not counted: some of them it does not check.
+// Allocations until one fails. Those of ONNX Runtime and of glibc's loader are not counted: some of them are not
+// checked.
 std::atomic<int> allocations_left{INT_MAX};
-std::atomic<size_t> min_bytes{1};
 std::atomic<bool> fails_for_good{false};  // and not only once
-std::atomic<const char*> onnxruntime_begin{nullptr}, onnxruntime_end{nullptr};
+struct Code {
+  std::atomic<const char*> begin{nullptr}, end{nullptr};
+  bool has(const char* place) const { return place >= begin.load() && place < end.load(); }
+} onnxruntime, loader;
 
-bool fails(size_t bytes, const void* caller) {
-  if (allocations_left.load(std::memory_order_relaxed) == INT_MAX || bytes < min_bytes) return false;
+bool fails(const void* caller) {
+  if (allocations_left.load(std::memory_order_relaxed) == INT_MAX) return false;
   const char* const at = static_cast<const char*>(caller);
-  if (at >= onnxruntime_begin.load() && at < onnxruntime_end.load()) return false;
+  if (onnxruntime.has(at) || loader.has(at)) return false;
   const int left = allocations_left.fetch_sub(1) - 1;
   if (left > 0) return false;
   if (!fails_for_good && left < 0) return false;
@@ -49,17 +52,15 @@ bool fails(size_t bytes, const void* caller) {
 #define CALLER __builtin_return_address(0)
 
 extern "C" {
-void* malloc(size_t size) { return fails(size, CALLER) ? nullptr : __libc_malloc(size); }
-void* calloc(size_t count, size_t size) { return fails(count * size, CALLER) ? nullptr : __libc_calloc(count, size); }
-void* realloc(void* memory, size_t size) { return fails(size, CALLER) ? nullptr : __libc_realloc(memory, size); }
-void* memalign(size_t alignment, size_t size) {
-  return fails(size, CALLER) ? nullptr : __libc_memalign(alignment, size);
-}
+void* malloc(size_t size) { return fails(CALLER) ? nullptr : __libc_malloc(size); }
+void* calloc(size_t count, size_t size) { return fails(CALLER) ? nullptr : __libc_calloc(count, size); }
+void* realloc(void* memory, size_t size) { return fails(CALLER) ? nullptr : __libc_realloc(memory, size); }
+void* memalign(size_t alignment, size_t size) { return fails(CALLER) ? nullptr : __libc_memalign(alignment, size); }
 void* aligned_alloc(size_t alignment, size_t size) {
-  return fails(size, CALLER) ? nullptr : __libc_memalign(alignment, size);
+  return fails(CALLER) ? nullptr : __libc_memalign(alignment, size);
 }
 int posix_memalign(void** memory, size_t alignment, size_t size) {
-  if (fails(size, CALLER)) return ENOMEM;
+  if (fails(CALLER)) return ENOMEM;
   *memory = __libc_memalign(alignment, size);
   return *memory == nullptr ? ENOMEM : 0;
 }
@@ -68,15 +69,15 @@ int posix_memalign(void** memory, size_t alignment, size_t size) {
 // Replaced so that the caller is who asked, not the C++ library; never inlined, since the caller is what counts.
 #define NEVER_INLINED __attribute__((noinline))
 NEVER_INLINED void* operator new(size_t size) {
-  if (void* memory = fails(size, CALLER) ? nullptr : __libc_malloc(size)) return memory;
+  if (void* memory = fails(CALLER) ? nullptr : __libc_malloc(size)) return memory;
   throw std::bad_alloc();
 }
 NEVER_INLINED void* operator new[](size_t size) {
-  if (void* memory = fails(size, CALLER) ? nullptr : __libc_malloc(size)) return memory;
+  if (void* memory = fails(CALLER) ? nullptr : __libc_malloc(size)) return memory;
   throw std::bad_alloc();
 }
 NEVER_INLINED void* operator new(size_t size, std::align_val_t alignment) {
-  if (void* memory = fails(size, CALLER) ? nullptr : __libc_memalign(size_t(alignment), size)) return memory;
+  if (void* memory = fails(CALLER) ? nullptr : __libc_memalign(size_t(alignment), size)) return memory;
   throw std::bad_alloc();
 }
 NEVER_INLINED void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
@@ -87,23 +88,22 @@ NEVER_INLINED void operator delete[](void* memory, size_t) noexcept { std::free(
 
 namespace {
 
-// Memory is short for large allocations first. Where a few bytes fail, the JSON library ends the process: its objects
-// have a type before they have a value, and its destructors allocate.
-constexpr size_t kLarge = 4096;
-
 constexpr char kTinyBundle[] = MAQ_TEST_DATA "/tiny_bundle";
 
-void find_onnxruntime() {
+void find_uncounted_code() {
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void*) {
-        if (std::strstr(info->dlpi_name, "onnxruntime") == nullptr) return 0;
+        Code* const code = std::strstr(info->dlpi_name, "onnxruntime") != nullptr ? &onnxruntime
+                           : std::strstr(info->dlpi_name, "ld-linux") != nullptr  ? &loader
+                                                                                  : nullptr;
+        if (code == nullptr) return 0;
         for (int i = 0; i < info->dlpi_phnum; ++i) {
           const ElfW(Phdr)& part = info->dlpi_phdr[i];
           if (part.p_type != PT_LOAD || (part.p_flags & PF_X) == 0) continue;
-          onnxruntime_begin = reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr);
-          onnxruntime_end = onnxruntime_begin + part.p_memsz;
+          code->begin = reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr);
+          code->end = code->begin + part.p_memsz;
         }
-        return 1;
+        return 0;
       },
       nullptr);
 }
@@ -120,8 +120,6 @@ maq_densepose_config one_thread() {
 // every time that it fails.
 class FailingAllocations {
  public:
-  explicit FailingAllocations(size_t min_bytes_given = 1) { min_bytes = min_bytes_given; }
-
   // To be called before the first allocation that may fail.
   void begin() const {
     fails_for_good = for_good_;
@@ -129,6 +127,7 @@ class FailingAllocations {
   }
 
   void run(const std::function<maq_status(const FailingAllocations&)>& call) {
+    find_uncounted_code();
     int failed = 0, wrong = 0;
     for (n_ = 1; wrong < 5; n_ += 1 + n_ / 16) {
       int left = 0;
@@ -165,6 +164,38 @@ TEST(MemoryLimits, AContextThatCannotBeMadeIsOutOfMemory) {
   });
 }
 
+// Starts ONNX Runtime twice, the first time with one failing allocation, its own counted too. Run by the next test in a
+// process of its own, since it starts once in a process.
+TEST(MemoryLimits, DISABLED_StartTwice) {
+  const maquette::Context context;
+  const char *version = nullptr, *path = nullptr;
+  const auto start = [&] { return maq_context_get_onnxruntime(context.get(), &version, &path); };
+  allocations_left = std::atoi(std::getenv("MAQ_TEST_FAILS"));
+  const maq_status first = start();
+  allocations_left = INT_MAX;
+  const std::string said = maq_status_get_name(first) + std::string(" ") + maq_status_get_name(start());
+  ASSERT_EQ(write(std::atoi(std::getenv("MAQ_TEST_PIPE")), said.data(), said.size()), ssize_t(said.size()));
+}
+
+TEST(MemoryLimits, OnnxRuntimeStartsAgainAfterItsMemoryFailed) {
+  int started_again = 0;
+  for (const int n : {40, 200, 1000, 3000, 9000, 20000, 30000, 40000}) {
+    const ChildOutcome outcome = run_in_child([&](int pipe) {
+      setenv("MAQ_TEST_FAILS", std::to_string(n).c_str(), 1);
+      setenv("MAQ_TEST_PIPE", std::to_string(pipe).c_str(), 1);
+      if (std::freopen("/dev/null", "w", stdout) == nullptr) return 1;
+      return execl("/proc/self/exe", "limits", "--gtest_filter=MemoryLimits.DISABLED_StartTwice",
+                   "--gtest_also_run_disabled_tests", nullptr);
+    });
+    if (outcome.trouble != "")
+      continue;  // some allocations ONNX Runtime does not check (docs/reference/reliability.md)
+    const std::string second = outcome.said.substr(outcome.said.find(' ') + 1);
+    EXPECT_EQ(second, "MAQ_OK") << n << ": " << outcome.said;
+    started_again += outcome.said.rfind("MAQ_OK", 0) != 0;
+  }
+  EXPECT_GT(started_again, 0);
+}
+
 // Opens a source and takes frames from it.
 maq_status take_frames(const maquette::Context& context, const char* uri, int frames) {
   maq_source* source = nullptr;
@@ -185,7 +216,7 @@ TEST(MemoryLimits, AStubIsOutOfMemory) {
     return take_frames(context, "stub:pattern?size=160x120", 2);
   });
   // Decodes a JPEG image.
-  FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
+  FailingAllocations().run([&](const FailingAllocations& failing) {
     failing.begin();
     return take_frames(context, "stub:people?size=160x120", 1);
   });
@@ -202,9 +233,8 @@ TEST(MemoryLimits, ALiveSourceIsOutOfMemoryAlsoOnItsThread) {
 TEST(MemoryLimits, ADensePoseModelIsOutOfMemoryWhileItIsMade) {
   const maquette::Context context;
   context.onnxruntime_version();
-  find_onnxruntime();
   const maq_densepose_config config = one_thread();
-  FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
+  FailingAllocations().run([&](const FailingAllocations& failing) {
     maq_densepose* densepose = nullptr;
     failing.begin();
     const maq_status status = maq_densepose_create(context.get(), &config, &densepose);
@@ -216,7 +246,6 @@ TEST(MemoryLimits, ADensePoseModelIsOutOfMemoryWhileItIsMade) {
 TEST(MemoryLimits, ARunIsOutOfMemoryAndTheNextRunWorks) {
   const maquette::Context context;
   context.onnxruntime_version();
-  find_onnxruntime();
   maquette::Source source(context, "stub:people?size=160x120");
   const maquette::Frame frame = *source.next();
   maquette::DensePose densepose(context, one_thread());
@@ -230,6 +259,29 @@ TEST(MemoryLimits, ARunIsOutOfMemoryAndTheNextRunWorks) {
   EXPECT_NO_THROW(densepose.run(frame));
 }
 
+TEST(MemoryLimits, ACaptureAndARecordingAreOutOfMemoryWhileTheirJsonIsRead) {
+  const TempFolder folder;
+  const std::string uri = "rec:" + folder.file("a.maqrec");
+  const maquette::Context context;
+  {
+    maquette::Source source(context, "stub:pattern?size=16x16&frames=1");
+    maquette::Recorder recorder(context, folder.file("a.maqrec"), &source);
+    recorder.add(*source.next());
+    recorder.finish();
+  }
+  FailingAllocations().run([&](const FailingAllocations& failing) {
+    failing.begin();
+    return take_frames(context, uri.c_str(), 1);
+  });
+  FailingAllocations().run([&](const FailingAllocations& failing) {
+    maq_capture* capture = nullptr;
+    failing.begin();
+    const maq_status status = maq_capture_open(context.get(), MAQ_TEST_DATA "/tiny_scene/capture", &capture);
+    maq_capture_destroy(capture);
+    return status;
+  });
+}
+
 TEST(MemoryLimits, FilesOfAResultAreOutOfMemory) {
   const TempFolder folder;
   const maquette::Context context;
@@ -237,19 +289,19 @@ TEST(MemoryLimits, FilesOfAResultAreOutOfMemory) {
   maquette::DensePose densepose(context, one_thread());
   const maquette::DensePoseResult result = densepose.run(*source.next());
   result.save(folder.file("a"));  // opens the codecs: glibc's loader ends the process where its memory fails
-  FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
+  const std::string path = folder.file("a");
+  FailingAllocations().run([&](const FailingAllocations& failing) {
     failing.begin();
-    return maq_densepose_result_save(result.get(), folder.file("a").c_str());
+    return maq_densepose_result_save(result.get(), path.c_str());
   });
 }
 
 TEST(MemoryLimits, APipelineIsOutOfMemoryAndEnds) {
   const maquette::Context context;
   context.onnxruntime_version();
-  find_onnxruntime();
   const maq_densepose_config densepose = one_thread();
   maq_pipeline_config config = maquette::default_pipeline_config();
-  FailingAllocations(kLarge).run([&](const FailingAllocations& failing) {
+  FailingAllocations().run([&](const FailingAllocations& failing) {
     maq_pipeline* pipeline = nullptr;
     maq_model* model = nullptr;
     failing.begin();

@@ -84,9 +84,33 @@ TEST_F(CommandLineSignals, EndAProgramThatWaitsForFramesWithWholeFiles) {
     EXPECT_TRUE(wait_until([&] { return has_file_with(one.folder, ".json"); }));  // on a busy machine after the warning
     for (int i = 0; i < one.times; ++i) one.program.send(one.number);
     const int status = one.program.wait_for_end();
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << status;
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 128 + one.number) << status;
     EXPECT_TRUE(has_file_with(one.folder, "_overlay.mp4"));
     EXPECT_FALSE(has_file_with(one.folder, ".part"));
+  }
+}
+
+TEST_F(CommandLineSignals, GiveEachCommandTheExitCodeOfTheTable) {
+  struct Case {
+    Case(const char* arguments, int exit_code_given) : exit_code(exit_code_given), program(folder, arguments) {}
+    const int exit_code;
+    const TempFolder folder;
+    Running program;
+  };
+  std::list<Case> cases;  // at the same time, since each waits for a while
+  cases.emplace_back("record 'stub:pattern?size=16x16&stall=@3' a.maqrec", 0);
+  cases.emplace_back("record 'stub:pattern?size=16x16&stall=@0' b.maqrec", 128 + SIGTERM);
+  cases.emplace_back("edges 'stub:solids?size=64x48&stall=@2' --out o", 128 + SIGTERM);
+  cases.emplace_back("novelty 'stub:pattern?size=64x48&stall=@2'", 0);
+  cases.emplace_back("novelty 'stub:pattern?size=64x48&stall=@2' --max-frames 9", 128 + SIGTERM);
+  cases.emplace_back("predict 'stub:pattern?size=64x48&stall=@2' --out p", 128 + SIGTERM);
+  for (Case& one : cases) {
+    const std::string said = one.folder.file("err.txt");
+    ASSERT_TRUE(waits_for_frames(one.folder)) << read_text(said);
+    one.program.send(SIGTERM);
+    const int status = one.program.wait_for_end();
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == one.exit_code)
+        << status << " instead of " << one.exit_code << ": " << read_text(said);
   }
 }
 

@@ -112,6 +112,7 @@ TEST_F(EdgesCommandLine, CurvesAreWrittenInEachFormatAndBoxesAreMeasured) {
       ++boxes;
       EXPECT_NEAR(box["size_m"][0].get<double>(), 0.441, 0.04);
       EXPECT_GT(box["size_tolerance_m"][2], 0);
+      EXPECT_EQ(box["includes_focal_tolerance"], false);
     }
   }
   EXPECT_EQ(count, 4u);
@@ -133,6 +134,24 @@ TEST_F(EdgesCommandLine, TheBundledDepthPictureGivesTheSizeOfItsCarton) {
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(boxes[0]["size_m"][i].get<double>(), truth["size_m"][i].get<double>(), 0.02);
   }
+}
+
+TEST_F(EdgesCommandLine, AWrongUnitIsAWarningAndTheToleranceSaysWhetherTheFocalLengthIsIn) {
+  environment_ = "MAQ_BUNDLE= MAQ_EDGES_BUNDLE='" MAQ_TEST_MODELS "/edges-int8'";
+  std::filesystem::create_directory_symlink(MAQ_TEST_MEDIA "/..", folder_.file("tests"));
+  std::string source = nlohmann::json::parse(read_text(MAQ_TEST_MEDIA "/box_depth.json"))["source"];
+  const Outcome sure = run("'" + source + "' --boxes");
+  EXPECT_NE(sure.out.find(" mm if the focal length is exact"), std::string::npos) << sure.out;
+  EXPECT_EQ(sure.err.find("unit"), std::string::npos) << sure.err;
+  const Outcome unsure = run("'" + source + "' --boxes --focal-tolerance 2");
+  EXPECT_NE(unsure.out.find(" mm\n"), std::string::npos) << unsure.out;
+  const size_t unit = source.find("depth_unit=");
+  ASSERT_NE(unit, std::string::npos);
+  source.replace(unit, source.find('&', unit) - unit, "depth_unit=1");
+  const Outcome wrong = run("'" + source + "' --boxes --json");
+  EXPECT_EQ(wrong.exit_code, 0);
+  EXPECT_NE(wrong.err.find("% is beyond 50 m, so its unit is probably wrong"), std::string::npos) << wrong.err;
+  EXPECT_GT(nlohmann::json::parse(wrong.out)["far_pixels"], 0);
 }
 
 TEST_F(EdgesCommandLine, AWrongFormatNothingToDoAndTheNetworkAreToldInWords) {

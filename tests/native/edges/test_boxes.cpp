@@ -41,6 +41,22 @@ TEST(Boxes, ABoxOfTheTrueFieldIsMeasuredWithinAMillimetre) {
   }
 }
 
+TEST(Boxes, TheToleranceIncludesTheFocalLengthAcrossTheOpticalAxisAlone) {
+  const SeenScene seen = see(lone_box(), camera_of(320, 240, 300));
+  CurveExtractor extractor;
+  const auto& curves = extractor.extract(seen.field);
+  std::vector<MeasuredBox> exact, uncertain;
+  BoxFinder().find(seen.field, curves, exact);
+  BoxFinder().find(seen.field, curves, uncertain, 0.02);
+  ASSERT_EQ(uncertain.size(), 1u);
+  for (size_t k = 0; k < 3; ++k) {
+    const double across = 1 - exact[0].axis[k].z * exact[0].axis[k].z;
+    EXPECT_NEAR(std::pow(uncertain[0].size_tolerance_m[k], 2),
+                std::pow(exact[0].size_tolerance_m[k], 2) + std::pow(0.02 * across * exact[0].size_m[k], 2), 1e-12);
+    EXPECT_EQ(uncertain[0].size_m[k], exact[0].size_m[k]);
+  }
+}
+
 TEST(Boxes, NoiseBlurAndSmearedDepthCostAFewMillimetres) {
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
     SeenScene seen = see(lone_box(), camera_of(640, 480, 600));

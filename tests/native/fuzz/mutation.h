@@ -6,11 +6,10 @@
 #include <cstring>
 #include <iterator>
 #include <random>
-#include <vector>
+
+#include "fuzz_target.h"
 
 namespace fuzz {
-
-using Bytes = std::vector<uint8_t>;
 
 class Mutator {
  public:
@@ -48,7 +47,6 @@ class Mutator {
                                         0xff800000,
                                         0x7fc00000,
                                         0x7f7fffff,
-                                        0x00000001,
                                         0x7c00,
                                         0xfc00,
                                         0x7e00,

@@ -592,6 +592,26 @@ TEST(Pipeline, ResultsAreDroppedWhileACallbackHoldsThemAll) {
   EXPECT_EQ(status_of_next(pipeline), MAQ_ERROR_UNSUPPORTED) << "it has a callback";
 }
 
+TEST(Pipeline, ACallbackThatThrowsIsAnErrorOfTheApp) {
+  maquette::Context context;
+  maq_pipeline_config config = maquette::default_pipeline_config();
+  config.result_callback = [](void*, maq_pipeline_result* result) {
+    maq_pipeline_result_release(result);
+    throw std::runtime_error("Own error.");
+  };
+  maquette::Pipeline pipeline(context, config);
+  pipeline.set_model(maquette::DensePoseModel(context, densepose_config()));
+  pipeline.set_source("stub:pattern?frames=6&size=32x32");
+  const auto end = std::chrono::steady_clock::now() + kLongEnough;
+  while (pipeline.info().state != MAQ_PIPELINE_FAILED && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(5ms);
+  }
+  const maq_pipeline_info info = pipeline.info();
+  EXPECT_EQ(info.status, MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(info.problem).find("config.result_callback threw an exception (Own error.)"), std::string::npos)
+      << info.problem;
+}
+
 TEST(Pipeline, RecordsWhatItMaps) {
   const TempFolder folder;
   Watched watched({});

@@ -45,8 +45,15 @@ TEST_F(DepthSources, AnImageIsDepthWhereAUnitIsGiven) {
   float metres = 0;
   std::memcpy(&metres, frame.image.planes[0].data + 4 * (2 * 40 + 7), 4);
   EXPECT_FLOAT_EQ(metres, 0.0523f);
-  ASSERT_EQ(open("")->next(0, frame), NextFrame::kFrame);
-  EXPECT_EQ(frame.image.format, MAQ_PIXEL_BGR8) << "a picture, as before";
+  expect_refused("", "depth.png?depth_unit=0.001&fov=60", MAQ_ERROR_UNSUPPORTED);
+  for (const int type : {CV_16UC1, CV_32FC1}) {
+    cv::imwrite(folder_.file("depth.tiff"), cv::Mat(30, 40, type, cv::Scalar(2)));
+    expect_error(MAQ_ERROR_UNSUPPORTED, "as depth cameras write it",
+                 [&] { maq::open_source(folder_.file("depth.tiff")); });
+  }
+  cv::imwrite(folder_.file("photo.png"), cv::Mat(30, 40, CV_16UC3, cv::Scalar(2)));
+  ASSERT_EQ(maq::open_source(folder_.file("photo.png"))->next(0, frame), NextFrame::kFrame);
+  EXPECT_EQ(frame.image.format, MAQ_PIXEL_BGR8) << "16 bits in colour are a photo";
   for (const char* unit : {"0", "-1", "nan", "inf", "1e9", "mm", ""}) {
     expect_refused(std::string("?depth_unit=") + unit, "depth_unit=");
   }
@@ -69,8 +76,10 @@ TEST_F(DepthSources, HaveTheCalibrationThatIsGiven) {
   EXPECT_EQ(by_focal->intrinsics()->fy_px, 36);
   EXPECT_EQ(by_focal->intrinsics()->cx_px, -4.5);
   EXPECT_EQ(by_focal->intrinsics()->cy_px, 100);
-  EXPECT_EQ(open("?fx=35")->intrinsics()->fy_px, 35) << "of pictures too; square pixels";
-  const auto scaled = open("?fx=40&fy=40&cx=9.5&size=20x15");
+  cv::imwrite(folder_.file("photo.png"), cv::Mat(30, 40, CV_8UC3, cv::Scalar(2)));
+  const std::string photo = "image:" + folder_.file("photo.png");
+  EXPECT_EQ(maq::open_source(photo + "?fx=35")->intrinsics()->fy_px, 35) << "of photos too; square pixels";
+  const auto scaled = maq::open_source(photo + "?fx=40&fy=40&cx=9.5&size=20x15");
   EXPECT_EQ(scaled->intrinsics()->width_px, 20);
   EXPECT_EQ(scaled->intrinsics()->fx_px, 20) << "it is of the picture as stored";
   EXPECT_EQ(scaled->intrinsics()->cx_px, 4.5);

@@ -41,7 +41,8 @@ OUT_OF_RANGE = {
         "result_pool_size": (65,), "key_frame_interval": (-1,), "min_person_height_px": (-1,), "detail": (2,),
         "person_crops": (3,), "person_crop_px": (63, 513)},
     "maq_edges_create": {"result_pool_size": (65,), "average_frames": (-1, 65)},
-    "maq_edges_result_find_curves": {"min_length_px": (3, 2e6, NAN), "skip_boxes": (2, -1)},
+    "maq_edges_result_find_curves": {
+        "min_length_px": (3, 2e6, NAN), "skip_boxes": (2, -1), "focal_tolerance": (-0.1, 0.6, NAN)},
     "maq_predictor_create": {"method": (5,), "frame_pool_size": (65,)},
     "maq_novelty_create": {"method": (2,), "event_ratio": (1, 0.5, -4, 1e7, NAN, float("inf"))},
     "maq_scene_build": {

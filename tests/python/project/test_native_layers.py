@@ -14,7 +14,7 @@ MAX_FILES, SMALL_UNIT_LINES = 25, 60
 
 # Each folder of sdk/src, and the folders that its files may include beside their own. A folder in a folder is a room of
 # its own: "scene" means the files of sdk/src/scene, not those of its rooms.
-BASE = {"core", "core/files", "core/math", "image", "image/geometry", "image/files", "nn"}
+BASE = {"core", "core/files", "core/json", "core/math", "image", "image/geometry", "image/files", "nn"}
 BACKEND = BASE - {"nn"} | {"sources"}
 CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
@@ -36,13 +36,14 @@ SYSTEMS = (
 MAY_INCLUDE = {
     "core": set(),
     "core/files": {"core"},
+    "core/json": set(),
     "core/math": set(),
     "core/trace": set(),
     "image": {"core", "image/geometry"},
     "image/files": {"core", "core/files", "image"},
     "image/files/android": {"core", "core/files", "image", "image/files"},
     "image/geometry": {"core", "image"},
-    "nn": {"core", "core/files"},
+    "nn": {"core", "core/files", "core/json"},
     "densepose": BASE | DENSEPOSE | {"core/trace"},
     "densepose/bundle": BASE,
     "densepose/detector": BASE | {"core/trace", "densepose/bundle"},
@@ -130,6 +131,7 @@ FOREIGN = {
     r"libcamera/.*": r"sdk/src/sources/libcamera/.*",
     r"depthai/.*": r"sdk/src/sources/depthai/depthai_session\.cpp",
     r"opencv2/.*": r"sdk/src/image/files/opencv_file_codecs\.cpp|sdk/tools/.*",
+    r"nlohmann/.*": r"sdk/src/core/json/.*\.cpp|sdk/tools/.*|desktop_demo/src/.*",
     r"png\.h": r"sdk/src/image/files/png\.cpp",
     r"GLFW/.*|epoxy/.*|imgui.*|backends/imgui.*": r"desktop_demo/src/.*",
     r"CLI/.*": r"sdk/tools/.*|desktop_demo/src/.*",

@@ -62,7 +62,8 @@ void CurveFinder::find(const EdgeField& field, const CurveRequest& request, Foun
   found.curves = extractor_.extract(field);
   found.curves_ms = float(stage.lap_ms());
   found.boxes.clear();
-  if (request.finds_boxes) box_finder_.find(field, found.curves, found.boxes);
+  if (request.finds_boxes) box_finder_.find(field, found.curves, found.boxes, request.focal_tolerance);
+  found.includes_focal_tolerance = request.focal_tolerance > 0;
   found.boxes_ms = request.finds_boxes ? float(stage.lap_ms()) : 0;
   found.seen.width = field.width;
   found.seen.height = field.height;
@@ -75,6 +76,8 @@ CurveRequest maq::curve_request(const maq_edges_curves_config* given, const char
   require_range(concatenate(name, ".skip_boxes"), config.skip_boxes, 0, 1);
   CurveRequest request;
   request.finds_boxes = config.skip_boxes == 0;
+  require_range(concatenate(name, ".focal_tolerance"), config.focal_tolerance, 0.0f, 0.5f);
+  request.focal_tolerance = double(config.focal_tolerance);
   if (config.min_length_px != 0) request.options.min_length_px = config.min_length_px;
   (void)CurveExtractor(request.options);  // checks them
   return request;
@@ -168,6 +171,7 @@ maq_status maq_edges_curves_get_box(const maq_edges_curves* curves, uint32_t ind
     const MeasuredBox& from = curves->found.boxes[index];
     maq_edges_box filled{};
     filled.corner_count = from.corners;
+    filled.includes_focal_tolerance = curves->found.includes_focal_tolerance ? 1 : 0;
     write_vector(from.centre, filled.centre_m);
     for (size_t i = 0; i < 3; ++i) {
       filled.size_m[i] = from.size_m[i];

@@ -75,6 +75,14 @@ maq_status maq_edges_run(maq_edges* edges, const maq_frame* frame, maq_edges_res
     require_argument(result, "result");
     BoundedPool<maq_edges_result>::Pooled handle = edges->results.acquire();
     edges->edges->run(frame->frame, handle->result);
+    const EdgesStats& stats = handle->result.stats;
+    if (!edges->has_warned_of_unit && stats.far_pixels * 2 > stats.known_pixels) {
+      edges->has_warned_of_unit = true;
+      edges->state->log().write(MAQ_LOG_WARNING, "Of the known depth, ", 100 * stats.far_pixels / stats.known_pixels,
+                                " % is beyond ", kFarDepthM,
+                                " m, so its unit is probably wrong: all lengths would be. "
+                                "Give depth of millimetres the unit 0.001 (depth_unit in a URI).");
+    }
     handle->curves = edges->curves;
     *result = lend<maq_edges_result>(std::move(handle));
     return MAQ_OK;
@@ -158,6 +166,7 @@ maq_status maq_edges_result_get_stats(const maq_edges_result* result, maq_edges_
     filled.threads = from.threads;
     filled.is_threads_measured = from.is_threads_measured ? 1 : 0;
     filled.averaged_pixel_count = from.averaged_pixels;
+    filled.far_pixel_count = from.far_pixels;
     write_struct(stats, "stats", filled);
     return MAQ_OK;
   });

@@ -103,9 +103,9 @@ maq_status maq_edges_fusion_finish(maq_edges_fusion* fusion) {
     fusion->found_curves = {};
     const auto report = [&](float done) {
       const auto callback = fusion->config.progress_callback;
-      if (callback != nullptr && callback(fusion->config.progress_user_data, double(done)) == 0) {
-        fusion->is_cancelled = true;
-      }
+      if (callback == nullptr) return;
+      const auto call = [&] { return callback(fusion->config.progress_user_data, double(done)); };
+      if (call_app("config.progress_callback", call) == 0) fusion->is_cancelled = true;
     };
     try {
       FusedField found;

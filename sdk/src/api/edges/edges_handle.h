@@ -26,6 +26,7 @@ uint32_t result_pool_size_of(const maq_edges_config& config);
 struct CurveRequest {
   CurveOptions options;
   bool finds_boxes = true;
+  double focal_tolerance = 0;  // 0: unknown
 };
 
 // The curves and boxes of a field, which may outlive it.
@@ -34,6 +35,7 @@ struct FoundCurves {
   std::vector<MeasuredBox> boxes;
   EdgeField seen;  // camera and depth alone, for snapping
   float curves_ms = 0, boxes_ms = 0;
+  bool includes_focal_tolerance = false;
 };
 
 // Finds curves and boxes. Keeps memory from frame to frame. One thread at a time.
@@ -70,6 +72,7 @@ struct maq_edges : maq::HandleOf<maq::HandleKind::kEdges> {
       : state(std::move(of)), edges(std::move(made)), results(pool_size, "results"), curves(pool_size, "curves") {}
   std::shared_ptr<maq::ContextState> state;
   std::unique_ptr<maq::Edges> edges;
+  bool has_warned_of_unit = false;
   maq::BoundedPool<maq_edges_result> results;
   maq::BoundedPool<maq_edges_curves> curves;
 };

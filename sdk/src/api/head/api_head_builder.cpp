@@ -94,7 +94,8 @@ maq_status maq_head_builder_create(maq_context* context, const maq_head_builder_
     head::HeadBuilder::Progress progress;
     if (config.progress_callback != nullptr) {
       progress = [callback = config.progress_callback, user_data = config.progress_user_data](double done) {
-        return callback(user_data, done, stage_of_fit(done)) != 0;
+        const auto call = [&] { return callback(user_data, done, stage_of_fit(done)); };
+        return call_app("config.progress_callback", call) != 0;
       };
     }
     *builder = new maq_head_builder(context->state, std::move(made), std::move(progress));
@@ -155,8 +156,9 @@ maq_status maq_head_builder_set_preview(maq_head_builder* builder, double interv
     head::HeadBuilder::Preview pass_on;
     if (preview != nullptr) {
       pass_on = [=](head::StoredHead head) {
-        preview(user_data,
-                new maq_head(std::move(head), builder->builder->threads(), builder->builder->template_head()));
+        auto* const made =
+            new maq_head(std::move(head), builder->builder->threads(), builder->builder->template_head());
+        call_app("preview", [&] { preview(user_data, made); });
       };
     }
     builder->builder->set_preview(interval_s, std::move(pass_on));

@@ -71,7 +71,8 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   if (config.progress_callback != nullptr) {
     settings.progress = [callback = config.progress_callback, user_data = config.progress_user_data](
                             double done, const std::string& stage) {
-      return callback(user_data, done, stage.c_str()) != 0;
+      const auto call = [&] { return callback(user_data, done, stage.c_str()); };
+      return call_app("config.progress_callback", call) != 0;
     };
   }
   return settings;

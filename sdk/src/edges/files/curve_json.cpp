@@ -1,54 +1,49 @@
 #include "edges/files/curve_json.h"
 
-#include <nlohmann/json.hpp>
-
-#include "core/memory.h"
+#include "core/json/json_text.h"
 #include "edges/files/curve_text.h"
 
 namespace maq {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr int kVersion = 1;
-constexpr size_t kBytesOfCurve = 4096, kBytesOfPoint = 512;  // upper limits of the document's memory
 
-Json json_of(Vec3 p) { return {p.x, p.y, p.z}; }
-
-Json json_of(const std::vector<Vec3>& points, int first, int count) {
-  Json list = Json::array();
-  for (int i = first; i < first + count; ++i) list.push_back(json_of(points[size_t(i)]));
-  return list;
+void write(JsonText& json, const char* name, Vec3 p) {
+  if (name != nullptr) json.key(name);
+  json.begin_list().value(p.x).value(p.y).value(p.z).end_list();
 }
 
-Json json_of(const EdgeCurves& curves, const EdgeCurve& curve) {
-  Json made;
-  made["kind"] = name_of(curve.kind);
-  made["bend"] = name_of(curve.convexity);
-  made["type"] = name_of(curve.type);
-  made["closed"] = curve.is_closed;
-  made["corners"] = curve.corner;
-  made["length_m"] = curve.length_m;
-  made["rms_r"] = curve.rms_footprints;
+void write(JsonText& json, const char* name, const std::vector<Vec3>& points, int first, int count) {
+  json.key(name).begin_list();
+  for (int i = first; i < first + count; ++i) write(json, nullptr, points[size_t(i)]);
+  json.end_list();
+}
+
+void write(JsonText& json, const EdgeCurves& curves, const EdgeCurve& curve) {
+  json.begin_object().member("kind", name_of(curve.kind)).member("bend", name_of(curve.convexity));
+  json.member("type", name_of(curve.type)).member("closed", curve.is_closed);
+  json.key("corners").begin_list().value(curve.corner[0]).value(curve.corner[1]).end_list();
+  json.member("length_m", curve.length_m).member("rms_r", curve.rms_footprints);
   if (curve.type == CurveType::kArc) {
-    made["centre"] = json_of(curve.centre);
-    made["x_axis"] = json_of(curve.x_axis);
-    made["y_axis"] = json_of(curve.y_axis);
-    made["sweep_rad"] = curve.sweep_rad;
+    write(json, "centre", curve.centre);
+    write(json, "x_axis", curve.x_axis);
+    write(json, "y_axis", curve.y_axis);
+    json.member("sweep_rad", curve.sweep_rad);
   }
   if (curve.type == CurveType::kSpline)
-    made["controls"] = json_of(curves.controls, curve.first_control, curve.control_count);
-  made["points"] = json_of(curves.points, curve.first_point, curve.point_count);
-  made["planes"] = Json::array();
+    write(json, "controls", curves.controls, curve.first_control, curve.control_count);
+  write(json, "points", curves.points, curve.first_point, curve.point_count);
+  json.key("planes").begin_list();
   for (size_t side = 0; side < 2; ++side) {
     if (curve.has_plane[side]) {
-      made["planes"].push_back(
-          {{"normal", json_of(curve.plane[side].normal)}, {"offset_m", curve.plane[side].offset_m}});
+      json.begin_object();
+      write(json, "normal", curve.plane[side].normal);
+      json.member("offset_m", curve.plane[side].offset_m).end_object();
     } else {
-      made["planes"].push_back(nullptr);
+      json.null();
     }
   }
-  return made;
+  json.end_list().end_object();
 }
 
 }  // namespace
@@ -64,19 +59,16 @@ const char* name_of(CurveType type) {
 }
 
 std::string curves_as_json(const EdgeCurves& curves) {
-  // The JSON library ends the process when an allocation fails.
-  require_memory(kBytesOfCurve * (1 + curves.curves.size() + curves.corners.size()) +
-                 kBytesOfPoint * (curves.points.size() + curves.controls.size()));
-  Json document;
-  document["version"] = kVersion;
-  document["axes"] = axes_of(curves);
-  document["corners"] = Json::array();
+  JsonText json(1);
+  json.begin_object().member("version", kVersion).member("axes", axes_of(curves)).key("corners").begin_list();
   for (const EdgeCorner& corner : curves.corners) {
-    document["corners"].push_back({{"point", json_of(corner.point)}, {"curves", corner.curve_count}});
+    json.begin_object();
+    write(json, "point", corner.point);
+    json.member("curves", corner.curve_count).end_object();
   }
-  document["curves"] = Json::array();
-  for (const EdgeCurve& curve : curves.curves) document["curves"].push_back(json_of(curves, curve));
-  return document.dump(1) + "\n";
+  json.end_list().key("curves").begin_list();
+  for (const EdgeCurve& curve : curves.curves) write(json, curves, curve);
+  return json.end_list().end_object().text() + "\n";
 }
 
 }  // namespace maq

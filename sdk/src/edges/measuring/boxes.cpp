@@ -126,7 +126,7 @@ bool BoxFinder::measure(const EdgeField& field, const EdgeCurves& curves, Measur
 }
 
 void BoxFinder::find(const EdgeField& field, const EdgeCurves& curves, std::vector<MeasuredBox>& found,
-                     double tolerance_deg) {
+                     double focal_tolerance, double tolerance_deg) {
   found.clear();
   const double tolerance = std::sin(std::clamp(tolerance_deg, 0.0, 45.0) * M_PI / 180);
   is_taken_.assign(curves.curves.size(), 0);
@@ -138,6 +138,10 @@ void BoxFinder::find(const EdgeField& field, const EdgeCurves& curves, std::vect
       if (!begin(curves, int(corner), tolerance, box.axis)) continue;
       collect(curves, int(corner), tolerance, box.axis);
       if (!measure(field, curves, box)) continue;
+      for (size_t k = 0; k < 3; ++k) {
+        const double across = 1 - box.axis[k].z * box.axis[k].z;  // of the squared length
+        box.size_tolerance_m[k] = std::hypot(box.size_tolerance_m[k], box.size_m[k] * across * focal_tolerance);
+      }
       for (const Side& side : sides_) is_taken_[size_t(side.curve)] = 1;
       found.push_back(box);
     }

@@ -20,9 +20,11 @@ class BoxFinder {
  public:
   // Corners in which lines meet within `tolerance_deg` of right angles start a box; lines that are connected to it and
   // run along its axes belong to it. A box needs a line between two corners along each of its three sides.
+  // `focal_tolerance`: two standard deviations of the focal lengths, as a fraction; they stretch lengths across the
+  // optical axis, and none along it.
   // `found` is overwritten: the largest volume first. Lines that bound more than one box belong to the first.
   void find(const EdgeField& field, const EdgeCurves& curves, std::vector<MeasuredBox>& found,
-            double tolerance_deg = 8);
+            double focal_tolerance = 0, double tolerance_deg = 8);
 
  private:
   struct Side {

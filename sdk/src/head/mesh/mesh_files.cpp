@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <locale>
+#include <optional>
 #include <sstream>
 
 #include "core/error.h"
@@ -90,15 +91,21 @@ void write_obj(const HeadMesh& mesh, const std::string& path, const std::vector<
                 "The name of the .obj has a line break, which its material's name cannot "
                 "have. Choose another name.");
   }
+  // All bytes are written before the first file gets its name: a full disk leaves all files or none.
+  AtomicFile obj_file(path), material_file(stem + ".mtl");
+  std::optional<AtomicFile> texture_file;
   std::string texture_name;
   if (!texture.empty()) {
     const std::string extension = is_png(texture) ? ".png" : ".jpg";
     texture_name = name + extension;
-    write_file(stem + extension, texture.data(), texture.size());
+    texture_file.emplace(stem + extension).append(texture.data(), texture.size());
   }
   const std::string material = material_as_mtl(texture_name), text = mesh_as_obj(mesh, name + ".mtl");
-  write_file(stem + ".mtl", material.data(), material.size());
-  write_file(path, text.data(), text.size());
+  material_file.append(material.data(), material.size());
+  obj_file.append(text.data(), text.size());
+  if (texture_file) texture_file->commit();
+  material_file.commit();
+  obj_file.commit();
 }
 
 template <class T>

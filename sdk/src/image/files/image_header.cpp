@@ -236,6 +236,21 @@ std::optional<SizePx> read_image_size(const EncodedBytes& bytes) {
   return {};
 }
 
+bool looks_like_depth(const EncodedBytes& bytes) {
+  constexpr uint32_t kBitsPerSample = 258, kSamplesPerPixel = 277;
+  const Reader in(bytes);
+  switch (recognise_format(bytes).format) {
+    case ImageFormat::kPng: return in.has(24, 2) && in.byte(24) == 16 && in.byte(25) == 0;
+    case ImageFormat::kTiff: {
+      const TiffDirectory directory(in);
+      const auto bits = directory.find(kBitsPerSample), samples = directory.find(kSamplesPerPixel);
+      const uint32_t depth = bits ? directory.number16(*bits) : 1;
+      return (depth == 16 || depth == 32) && (!samples || directory.number16(*samples) == 1);
+    }
+    default: return false;
+  }
+}
+
 std::optional<ExifOrientationPlace> find_exif_orientation(const EncodedBytes& bytes) {
   const Reader all(bytes);
   const size_t begin = exif_offset(all, recognise_format(bytes).format);

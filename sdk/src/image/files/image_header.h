@@ -44,6 +44,9 @@ struct SizePx {
 // for truncated headers.
 std::optional<SizePx> read_image_size(const EncodedBytes& bytes);
 
+// Whether the header is of a grey PNG image of 16 bits, or a grey TIFF image of 16 or 32: as depth cameras write depth.
+bool looks_like_depth(const EncodedBytes& bytes);
+
 // The EXIF orientation (Exif 2.32, 4.6.4, tag 274) of a whole JPEG, PNG or WebP image: 1 to 8, and 1 where there is
 // none.
 int read_exif_orientation(const EncodedBytes& bytes);

@@ -2,19 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "core/error.h"
 #include "core/files/file.h"
 #include "core/files/file_reader.h"
+#include "core/json/json_value.h"
 #include "image/files/image_file.h"
 
 namespace maq {
 namespace {
-
-using nlohmann::json;
 
 // Some 25,000 frames. Parsed, a hostile file takes twenty times as much.
 constexpr uint64_t kMaxBytes = 16 << 20;
@@ -24,7 +22,7 @@ constexpr double kLargestDepthUnit = 1e6;
 // The values for a frame: its own, or the file's for all frames.
 class Facts {
  public:
-  Facts(const json& frame, const json& shared, std::string where)
+  Facts(const JsonValue& frame, const JsonValue& shared, std::string where)
       : frame_(frame), shared_(shared), where_(std::move(where)) {}
 
   template <class... Parts>
@@ -32,51 +30,49 @@ class Facts {
     throw Error(MAQ_ERROR_UNREADABLE, where_, ": ", parts..., ".");
   }
 
-  const json* find(const char* key) const {
-    for (const json* owner : {&frame_, &shared_}) {
-      const auto found = owner->find(key);
-      if (found != owner->end()) return &*found;
-    }
-    return nullptr;
+  const JsonValue* find(const char* key) const {
+    const JsonValue* const own = frame_.find(key);
+    return own != nullptr ? own : shared_.find(key);
   }
   std::optional<double> number(const char* key) const {
-    const json* value = find(key);
+    const JsonValue* value = find(key);
     if (value == nullptr) return {};
-    if (!value->is_number()) fail("\"", key, "\" is not a number");
-    return value->get<double>();
+    if (!value->number()) fail("\"", key, "\" is not a number");
+    return value->number();
   }
   double number_or(const char* key, double fallback) const { return number(key).value_or(fallback); }
   bool flag(const char* key) const {
-    const json* value = find(key);
+    const JsonValue* value = find(key);
     if (value == nullptr) return false;
-    if (!value->is_boolean()) fail("\"", key, "\" is neither true nor false");
-    return value->get<bool>();
+    if (value->flag() == nullptr) fail("\"", key, "\" is neither true nor false");
+    return *value->flag();
   }
   std::string text(const char* key) const {
-    const json* value = find(key);
+    const JsonValue* value = find(key);
     if (value == nullptr) return "";
-    if (!value->is_string()) fail("\"", key, "\" is not a text");
-    return value->get<std::string>();
+    if (value->text() == nullptr) fail("\"", key, "\" is not a text");
+    return *value->text();
   }
 
  private:
-  const json& frame_;
-  const json& shared_;
+  const JsonValue& frame_;
+  const JsonValue& shared_;
   std::string where_;
 };
 
-json parse(const std::string& path) {
+JsonValue parse(const std::string& path) {
   FileReader file(path);
   if (file.remaining() > kMaxBytes) {
     file.fail(" has ", file.remaining(), " bytes, over the limit of ", kMaxBytes, "; leave some frames out.");
   }
   std::string text(size_t(file.remaining()), '\0');
   file.read(text.data(), text.size());
-  json document = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (document.is_discarded() || !document.is_object()) {
-    file.fail(" is not a JSON object: it is truncated or damaged, or has NaN in it.");
+  try {
+    JsonValue document = JsonValue::parse(text);
+    if (document.object() != nullptr) return document;
+  } catch (const JsonError&) {
   }
-  return document;
+  file.fail(" is not a JSON object: it is truncated or damaged, or has NaN in it.");
 }
 
 bool is_fisheye(const Facts& facts) {
@@ -132,14 +128,16 @@ void read_intrinsics(const Facts& facts, Lens& lens) {
 }
 
 void read_pose(const Facts& facts, PosedPhoto& photo) {
-  const json* matrix = facts.find("transform_matrix");
-  bool is_matrix = matrix != nullptr && matrix->is_array() && (matrix->size() == 3 || matrix->size() == 4);
+  const JsonValue* found = facts.find("transform_matrix");
+  const JsonValue::List* matrix = found == nullptr ? nullptr : found->list();
+  bool is_matrix = matrix != nullptr && (matrix->size() == 3 || matrix->size() == 4);
   double m[3][4] = {};
   for (size_t i = 0; i < 3 && is_matrix; ++i) {
-    const json& row = (*matrix)[i];
-    is_matrix = row.is_array() && row.size() == 4 &&
-                std::all_of(row.begin(), row.end(), [](const json& value) { return value.is_number(); });
-    for (size_t k = 0; k < 4 && is_matrix; ++k) m[i][k] = row[k].get<double>();
+    const JsonValue::List* row = (*matrix)[i].list();
+    is_matrix = row != nullptr && row->size() == 4 && std::all_of(row->begin(), row->end(), [](const JsonValue& value) {
+                  return value.number().has_value();
+                });
+    for (size_t k = 0; k < 4 && is_matrix; ++k) m[i][k] = *(*row)[k].number();
   }
   if (!is_matrix) facts.fail("\"transform_matrix\" is not one of 3 or 4 rows of 4 numbers");
   for (size_t i = 0; i < 3; ++i) {
@@ -158,16 +156,16 @@ std::string with_extension(const std::string& folder, const std::string& name) {
   return name;
 }
 
-std::set<std::string> held_out_names(const json& document, const std::string& path) {
+std::set<std::string> held_out_names(const JsonValue& document, const std::string& path) {
   std::set<std::string> names;
-  const auto list = document.find("test_filenames");
-  if (list == document.end()) return names;
-  if (!list->is_array()) throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" is not a list.");
-  for (const json& name : *list) {
-    if (!name.is_string()) {
+  const JsonValue* list = document.find("test_filenames");
+  if (list == nullptr) return names;
+  if (list->list() == nullptr) throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" is not a list.");
+  for (const JsonValue& name : *list->list()) {
+    if (name.text() == nullptr) {
       throw Error(MAQ_ERROR_UNREADABLE, path, ": \"test_filenames\" has an entry that is not a text.");
     }
-    names.insert(name.get<std::string>());
+    names.insert(*name.text());
   }
   return names;
 }
@@ -176,19 +174,19 @@ std::set<std::string> held_out_names(const json& document, const std::string& pa
 
 TransformsFile read_transforms_file(const std::string& folder, const std::string& file_name, ImportReport& report) {
   const std::string path = folder + "/" + file_name;
-  const json document = parse(path);
-  const json none = json::object();
+  const JsonValue document = parse(path), none;
   TransformsFile read;
   read.cloud = Facts(none, document, path).text("ply_file_path");
-  const auto frames = document.find("frames");
-  if (frames == document.end() || !frames->is_array()) {
+  const JsonValue* listed = document.find("frames");
+  const JsonValue::List* frames = listed == nullptr ? nullptr : listed->list();
+  if (frames == nullptr) {
     throw Error(MAQ_ERROR_UNREADABLE, path, " has no list \"frames\".");
   }
   const std::set<std::string> held_out = held_out_names(document, path);
   for (size_t i = 0; i < frames->size(); ++i) {
     const std::string where = path + ", frame " + std::to_string(i);
-    const json& frame = (*frames)[i];
-    if (!frame.is_object()) throw Error(MAQ_ERROR_UNREADABLE, where, ": it is not a JSON object.");
+    const JsonValue& frame = (*frames)[i];
+    if (frame.object() == nullptr) throw Error(MAQ_ERROR_UNREADABLE, where, ": it is not a JSON object.");
     const Facts facts(frame, document, where);
     PosedPhoto photo;
     photo.name = facts.text("file_path");

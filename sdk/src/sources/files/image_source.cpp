@@ -22,7 +22,14 @@ class ImageSource : public Source {
     if (depth_unit_m) {
       read_depth_file(uri.target, *depth_unit_m, image_);
     } else {
-      read_image_file(uri.target, image_);
+      const std::vector<uint8_t> bytes = read_encoded_image(uri.target);
+      if (looks_like_depth(bytes)) {
+        throw Error(MAQ_ERROR_UNSUPPORTED, uri.target,
+                    " is a grey image of 16 bits or more, as depth cameras write it, and not a photo. To read it as "
+                    "depth, add metres of a stored 1 and the field of view in degrees: image:",
+                    uri.target, "?depth_unit=0.001&fov=60. To read it as a photo, convert it to 8 bits.");
+      }
+      decode_image(bytes, uri.target, image_);
     }
     intrinsics_ = calibration.intrinsics(image_.image.width_px, image_.image.height_px);
     if (uri.width_px > 0) {

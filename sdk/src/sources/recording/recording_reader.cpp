@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "core/checked_arithmetic.h"
 #include "core/error.h"
 #include "core/files/file.h"
+#include "core/json/json_value.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 
@@ -44,23 +44,35 @@ size_t depth_bytes(const FrameHead& head) { return size_t(head.depth_width_px) *
 
 size_t whole_bytes(const FrameHead& head) { return sizeof head + head.picture_bytes + depth_bytes(head); }
 
-std::optional<maq_intrinsics> intrinsics_of(const nlohmann::json& from) {
+// Throws JsonError for a number that is missing.
+double number_in(const JsonValue& from, const char* key) {
+  const JsonValue* const value = from.find(key);
+  const std::optional<double> number = value == nullptr ? std::nullopt : value->number();
+  if (!number) throw JsonError(key);
+  return *number;
+}
+
+std::optional<maq_intrinsics> intrinsics_of(const JsonValue& from) {
+  const double width_px = number_in(from, "width_px"), height_px = number_in(from, "height_px");
   maq_intrinsics intrinsics{};
-  intrinsics.width_px = from.at("width_px").get<int32_t>();
-  intrinsics.height_px = from.at("height_px").get<int32_t>();
-  intrinsics.fx_px = from.at("fx_px").get<double>();
-  intrinsics.fy_px = from.at("fy_px").get<double>();
-  intrinsics.cx_px = from.at("cx_px").get<double>();
-  intrinsics.cy_px = from.at("cy_px").get<double>();
-  const auto distortion = from.at("distortion").get<std::vector<double>>();
-  bool is_sane = is_allowed_size(intrinsics.width_px, intrinsics.height_px) && distortion.size() == 8 &&
-                 intrinsics.fx_px > 0 && intrinsics.fy_px > 0;
-  for (const double value : {intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px}) {
-    is_sane = is_sane && std::isfinite(value);
+  intrinsics.fx_px = number_in(from, "fx_px");
+  intrinsics.fy_px = number_in(from, "fy_px");
+  intrinsics.cx_px = number_in(from, "cx_px");
+  intrinsics.cy_px = number_in(from, "cy_px");
+  const JsonValue* const distortion = from.find("distortion");
+  if (distortion == nullptr || distortion->list() == nullptr) throw JsonError("distortion");
+  bool is_sane = width_px <= MAQ_MAX_SIDE_PX && height_px <= MAQ_MAX_SIDE_PX &&
+                 is_allowed_size(int64_t(std::max(width_px, 0.0)), int64_t(std::max(height_px, 0.0))) &&
+                 distortion->list()->size() == std::size(intrinsics.distortion) && intrinsics.fx_px > 0 &&
+                 intrinsics.fy_px > 0;
+  for (size_t i = 0; i < std::size(intrinsics.distortion) && is_sane; ++i) {
+    const std::optional<double> value = (*distortion->list())[i].number();
+    if (!value) throw JsonError("distortion");
+    intrinsics.distortion[i] = *value;
   }
-  for (const double value : distortion) is_sane = is_sane && std::isfinite(value);
   if (!is_sane) return {};
-  std::copy(distortion.begin(), distortion.end(), intrinsics.distortion);
+  intrinsics.width_px = int32_t(width_px);
+  intrinsics.height_px = int32_t(height_px);
   return intrinsics;
 }
 
@@ -109,12 +121,14 @@ void RecordingReader::read_head() {
     throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head is not what was written; copy it again.");
   }
   try {
-    const auto parsed = nlohmann::json::parse(json);
-    info_.source = parsed.at("source").get<std::string>();
-    info_.fps = parsed.at("fps").get<double>();
+    const JsonValue parsed = JsonValue::parse(json);
+    const JsonValue* const source = parsed.find("source");
+    if (source == nullptr || source->text() == nullptr) throw JsonError("source");
+    info_.source = *source->text();
+    info_.fps = number_in(parsed, "fps");
     if (!(info_.fps >= 0 && info_.fps <= 1000)) info_.fps = 0;
-    if (parsed.contains("calibration")) info_.intrinsics = intrinsics_of(parsed.at("calibration"));
-  } catch (const nlohmann::json::exception&) {
+    if (const JsonValue* calibration = parsed.find("calibration")) info_.intrinsics = intrinsics_of(*calibration);
+  } catch (const JsonError&) {
     throw Error(MAQ_ERROR_UNREADABLE, path_, " is damaged: its head says nothing of its frames.");
   }
   first_offset_ = sizeof head + json.size();

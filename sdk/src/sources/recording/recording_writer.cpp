@@ -7,11 +7,11 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "core/build_info.h"
 #include "core/error.h"
 #include "core/files/blocked_write_signals.h"
+#include "core/json/json_text.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
 
@@ -22,19 +22,20 @@ constexpr const char* kPredictedRefused =
     "The frame was predicted: no camera took it. Leave it out, or make the recorder with "
     "keep_predicted = 1, which marks it.";
 
+// In the order of the alphabet. A name that is not UTF-8 does not prevent a recording.
 std::string head_json(const RecordingInfo& info) {
-  nlohmann::json head;
-  head["made_by"] = std::string("maquette ") + sdk_version();
-  head["source"] = info.source;
-  head["fps"] = info.fps;
+  JsonText json(1);
+  json.begin_object();
   if (info.intrinsics) {
     const maq_intrinsics& from = *info.intrinsics;
-    head["calibration"] = {{"width_px", from.width_px},    {"height_px", from.height_px}, {"fx_px", from.fx_px},
-                           {"fy_px", from.fy_px},          {"cx_px", from.cx_px},         {"cy_px", from.cy_px},
-                           {"distortion", from.distortion}};
+    json.key("calibration").begin_object().member("cx_px", from.cx_px).member("cy_px", from.cy_px);
+    json.key("distortion").begin_list();
+    for (const double value : from.distortion) json.value(value);
+    json.end_list().member("fx_px", from.fx_px).member("fy_px", from.fy_px);
+    json.member("height_px", from.height_px).member("width_px", from.width_px).end_object();
   }
-  // A name that is not UTF-8 must not prevent a recording.
-  return head.dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+  json.member("fps", info.fps).member("made_by", std::string("maquette ") + sdk_version());
+  return json.member("source", info.source).end_object().text();
 }
 
 }  // namespace

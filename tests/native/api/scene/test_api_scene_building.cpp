@@ -85,6 +85,14 @@ TEST_F(ApiSceneBuilding, TheCallbackCancelsAtEveryCall) {
   config.progress_callback = Progress::call;
   config.progress_user_data = &whole;
   maquette::Scene(context_, config, capture);
+  const auto progress_of = config.progress_callback;
+  config.progress_callback = [](void*, double, const char*) -> int32_t { throw std::runtime_error("Own error."); };
+  maq_scene* none = nullptr;
+  EXPECT_EQ(maq_scene_build(context_.get(), &config, capture.get(), &none), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(maq_last_error(nullptr),
+               "maq_scene_build: config.progress_callback threw an exception (Own error.); functions that the library "
+               "calls must not.");
+  config.progress_callback = progress_of;
   for (size_t calls = 0; calls + 1 < whole.done.size(); ++calls) {
     Progress progress;
     progress.ends_at = calls;

@@ -11,6 +11,7 @@
 #include "head/mesh/mesh_cleanup.h"
 #include "head/mesh/mesh_files.h"
 #include "support/expect_error.h"
+#include "support/file_size_limit.h"
 #include "support/temp_folder.h"
 
 namespace {
@@ -228,11 +229,25 @@ TEST(MeshFiles, WhatIsWrongWithAMeshIsSaidAndNoFileIsLeft) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
+TEST(MeshFiles, AFullDiskLeavesNoFileOfAnObj) {
+  const TempFolder folder;
+  const HeadMesh mesh = with_coordinates(example());
+  write_mesh_file(mesh, folder.file("b.obj"), small_png());
+  const auto bytes = std::filesystem::file_size(folder.file("b.obj"));
+  ASSERT_GT(bytes, std::filesystem::file_size(folder.file("b.png")) + 1);
+  {
+    const FileSizeLimit full(bytes - 1);
+    expect_error(MAQ_ERROR_UNWRITABLE, "a.obj", [&] { write_mesh_file(mesh, folder.file("a.obj"), small_png()); });
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    EXPECT_EQ(entry.path().stem(), "b") << entry.path();
+  }
+}
+
 TEST(MeshFiles, AFolderThatIsNotThereIsSaid) {
   const TempFolder folder;
   for (const char* name : {"no/a.glb", "no/a.obj", "no/a.ply"}) {
-    expect_error(MAQ_ERROR_UNWRITABLE, name[5] == 'o' ? "a.mtl" : name,
-                 [&] { write_mesh_file(example(), folder.file(name)); });
+    expect_error(MAQ_ERROR_UNWRITABLE, name, [&] { write_mesh_file(example(), folder.file(name)); });
   }
 }
 

@@ -15,15 +15,18 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
      *
      * @property minLengthPx shorter curves are dropped.
      * @property skipBoxes true: do not search for boxes.
+     * @property focalTolerance two standard deviations of the focal lengths, as a fraction; 0: unknown.
      */
     data class Config(
         val minLengthPx: Float = 10f,
         val skipBoxes: Boolean = false,
+        val focalTolerance: Float = 0f,
     ) {
         internal fun native() =
             maq_edges_curves_config().also {
                 it.min_length_px = minLengthPx
                 it.skip_boxes = skipBoxes.toInt()
+                it.focal_tolerance = focalTolerance
             }
     }
 
@@ -74,6 +77,7 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
      * @property sizeM lengths of the sides, the longest first.
      * @property sizeToleranceM two standard deviations of each length.
      * @property axes directions of the sides, length 1.
+     * @property includesFocalTolerance whether [sizeToleranceM] includes [Config.focalTolerance].
      */
     data class Box(
         val cornersSeen: Int,
@@ -81,6 +85,7 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
         val sizeToleranceM: List<Double>,
         val axes: List<Point3>,
         val centre: Point3,
+        val includesFocalTolerance: Boolean,
     )
 
     /** The kinds of targets that a pointer can snap to. */
@@ -159,6 +164,8 @@ class EdgeCurves internal constructor(pointer: Long) : AutoCloseable {
 
     private fun boxAt(index: Int): Box {
         val b = handle.read(maq_edges_box()) { it, box -> Native.maq_edges_curves_get_box(it, index, box) }
-        return Box(b.corner_count, b.size_m, b.size_tolerance_m, b.axes.chunked(3, Point3::of), Point3.of(b.centre_m))
+        val axes = b.axes.chunked(3, Point3::of)
+        val includesFocal = b.includes_focal_tolerance != 0
+        return Box(b.corner_count, b.size_m, b.size_tolerance_m, axes, Point3.of(b.centre_m), includesFocal)
     }
 }

@@ -102,6 +102,8 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
         val threads: Int,
         val isThreadsMeasured: Boolean,
         val averagedPixels: Long,
+        /** Pixels beyond 50 m; more than half of the known ones: the unit of the depth is probably wrong. */
+        val farPixels: Long,
     )
 
     /** The largest distance, in footprints. */
@@ -158,7 +160,7 @@ class EdgesResult internal constructor(pointer: Long) : AutoCloseable {
             return Stats(
                 s.depth_ms, s.skip_ms, s.slopes_ms, s.network_ms, s.decode_ms, s.total_ms, s.known_pixel_count,
                 s.network_pixel_count, s.broken_pixel_count, DensePose.Provider.of(s.provider), s.threads,
-                s.is_threads_measured != 0, s.averaged_pixel_count,
+                s.is_threads_measured != 0, s.averaged_pixel_count, s.far_pixel_count,
             )
         }
 

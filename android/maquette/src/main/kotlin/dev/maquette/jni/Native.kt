@@ -357,9 +357,9 @@ internal class maq_densepose_surface(outer: Memory? = null, at: Int = 0) : Struc
     val nodes get() = int(4); val points_m get() = Pointer(this, 8)
 }
 
-internal class maq_edges_box(outer: Memory? = null, at: Int = 0) : Struct(152, outer, at) {
+internal class maq_edges_box(outer: Memory? = null, at: Int = 0) : Struct(160, outer, at) {
     val corner_count get() = int(4); val size_m get() = doubles(8, 3); val size_tolerance_m get() = doubles(32, 3)
-    val axes get() = doubles(56, 9); val centre_m get() = doubles(128, 3)
+    val axes get() = doubles(56, 9); val centre_m get() = doubles(128, 3); val includes_focal_tolerance get() = int(152)
 }
 
 internal class maq_edges_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
@@ -378,9 +378,10 @@ internal class maq_edges_curve(outer: Memory? = null, at: Int = 0) : Struct(232,
     val points_m get() = Pointer(this, 48); val point_count get() = int(56); val centre_m get() = doubles(72, 3)
 }
 
-internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {
+internal class maq_edges_curves_config(outer: Memory? = null, at: Int = 0) : Struct(16, outer, at) {
     var min_length_px: Float get() = float(4); set(v) = float(4, v)
     var skip_boxes: Int get() = int(8); set(v) = int(8, v)
+    var focal_tolerance: Float get() = float(12); set(v) = float(12, v)
 }
 
 internal class maq_edges_curves_stats(outer: Memory? = null, at: Int = 0) : Struct(40, outer, at) {
@@ -397,13 +398,14 @@ internal class maq_edges_snap(outer: Memory? = null, at: Int = 0) : Struct(56, o
     val distance_px get() = double(40)
 }
 
-internal class maq_edges_stats(outer: Memory? = null, at: Int = 0) : Struct(80, outer, at) {
+internal class maq_edges_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
     val depth_ms get() = float(4).toDouble(); val skip_ms get() = float(8).toDouble()
     val slopes_ms get() = float(12).toDouble(); val network_ms get() = float(16).toDouble()
     val decode_ms get() = float(20).toDouble(); val total_ms get() = float(24).toDouble()
     val known_pixel_count get() = long(32); val network_pixel_count get() = long(40)
     val broken_pixel_count get() = long(48); val provider get() = int(56); val threads get() = int(60)
     val is_threads_measured get() = int(64); val averaged_pixel_count get() = long(72)
+    val far_pixel_count get() = long(80)
 }
 
 internal class maq_frame_desc(outer: Memory? = null, at: Int = 0) : Struct(176, outer, at) {

@@ -106,7 +106,7 @@ test-release: packages-test  ## unpacks build/dist; checks signature, checksums,
 	@.venv/bin/python -m pytest tests/release
 
 .PHONY: test-reproducible
-test-reproducible: packages-demo  ## builds the library in two folders and compares all files; 7 to 15 minutes of processor time; not part of `test-all`
+test-reproducible: packages-demo  ## builds the library in two folders and compares all files; 6.5 minutes of processor time; not part of `test-all`
 	@JOBS=$(JOBS) scripts/release/reproducible.sh
 
 .PHONY: site

@@ -4,7 +4,7 @@
 #   scripts/release/reproducible.sh
 #
 # The commit at HEAD is built: in build/reproducible/one, and, without a compiler cache, in
-# build/reproducible/another-folder. Takes 7 to 15 minutes of processor time.
+# build/reproducible/another-folder. Takes 6.5 minutes of processor time.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 case "${1:-}" in '') ;; *) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;; esac

@@ -106,7 +106,9 @@ def add_to_wheel(wheel: Path) -> None:
             if entry.filename == place:  # of an earlier run
                 continue
             if entry.filename == record:
-                archive.writestr(zipfile.ZipInfo(place, entry.date_time), data)
+                added = zipfile.ZipInfo(place, entry.date_time)
+                added.compress_type, added.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+                archive.writestr(added, data)
                 lines = [line for line in content.decode().splitlines() if not line.startswith(place)]
                 content = "\n".join([*lines[:-1], f"{place},sha256={digest},{len(data)}", lines[-1], ""]).encode()
             entry.compress_type = zipfile.ZIP_DEFLATED

@@ -18,18 +18,11 @@ from tqdm import tqdm
 
 from benchmarks.frame_time import MAX_OTHERS, OthersFraction
 
-METRICS = ("library_mb", "files_library_mb", "libraries_context", "libraries_densepose", "context_cpu_ms",
+METRICS = ("library_mb", "libraries_context", "libraries_densepose", "context_cpu_ms",
            "first_result_cpu_ms")  # fmt: skip
 PROGRAM = Path("build/release/benchmarks/native/measure_startup")
 STARTS = 15
 NAMES = {"context": "a context alone", "densepose": "a dense pose model, to the first result"}
-
-
-def library_files() -> dict[str, Path]:
-    """Returns the shipped libraries: libmaquette, and the part that reads files and clips, which is loaded on
-    demand."""
-    library = library_path().resolve()
-    return {"library": library, "files_library": library.parent / "maquette/libmaquette_files.so"}
 
 
 def needed(library: Path) -> list[str]:
@@ -54,11 +47,11 @@ def measure(quick: bool) -> tuple[dict, dict[str, float]]:
         for kind, runs in starts.items():
             runs.append(start(kind))
     busy = others.now()
+    library = library_path().resolve()
     document = {
         "processes": {kind: {"libraries": runs[-1]["libraries"], "cpu_ms": [run["cpu_ms"] for run in runs]}
                       for kind, runs in starts.items()},
-        "files": {name: {"name": path.name, "bytes": path.stat().st_size, "needed": needed(path)}
-                  for name, path in library_files().items()},
+        "files": {"library": {"name": library.name, "bytes": library.stat().st_size, "needed": needed(library)}},
         "warnings": [f"other processes used {busy:.0%} of the CPU (start)"] if busy > MAX_OTHERS else [],
     }  # fmt: skip
     return document, metrics_of(document)
@@ -88,6 +81,4 @@ def section(measured: dict) -> tuple[str, list]:
         "A small C program. Shared libraries: all loaded ones, without the program and the kernel's object. CPU time: "
         "all threads since the process began, including the loading of libraries.",
         files,
-        "libmaquette_files and its dependencies are loaded when a file or a clip is opened; an app with a camera never "
-        "loads them.",
     ]

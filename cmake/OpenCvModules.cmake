@@ -1,6 +1,6 @@
-# OpenCV for what reads and writes files (libmaquette_files.so), the command line and the tests; libmaquette.so does without.
+# OpenCV for the native tests and benchmarks, as a second opinion on images; what is shipped does without.
 # Targets opencv_core, opencv_imgproc, opencv_imgcodecs and opencv_videoio.
-# Sets OpenCV_VERSION. Taken from OpenCV's own CMake package where there is one; Debian ships that only with the
+# Taken from OpenCV's own CMake package where there is one; Debian ships that only with the
 # complete libopencv-dev, while the -dev packages of the modules, a fifth of its size, have headers and libraries only.
 find_package(OpenCV 4.5 CONFIG QUIET COMPONENTS core imgproc imgcodecs videoio)
 if(NOT OpenCV_FOUND)

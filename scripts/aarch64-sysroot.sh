@@ -16,7 +16,7 @@ esac
 
 packages=(libc6 libstdc++6 libgtest-dev libgmock-dev nlohmann-json3-dev libcli11-dev
     libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev
-    libturbojpeg0-dev libpng-dev libxxhash-dev)
+    libturbojpeg0-dev libpng-dev libwebp-dev libvpx-dev libxxhash-dev)
 sysroot="$PWD/.deps/aarch64-sysroot"
 stamp="$sysroot/.ready"
 # The stamp is written last and holds what made the folder, so an interrupted or older one is made again.

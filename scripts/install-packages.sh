@@ -56,9 +56,11 @@ needs_command npm npm                  # brings ONNX Runtime: headers, and the l
 [ "$(uname -m)" = x86_64 ] || needs_command mvn maven  # ... and the library for other machines
 needs_package nlohmann-json3-dev
 needs_package libcli11-dev
-for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
 needs_package libturbojpeg0-dev
 needs_package libpng-dev
+needs_package libwebp-dev
+needs_package libvpx-dev
+needs_command ffmpeg ffmpeg            # reads clips
 needs_package libxxhash-dev
 needs_package ca-certificates
 # make-venv.sh needs a Python that can create environments.
@@ -73,6 +75,7 @@ if wants test isa camera-vm lint fuzz android newcomer; then
     needs_command git git
     needs_command ccache ccache       # what was compiled in another checkout is not compiled again
     needs_command assimp assimp-utils  # a reader of heads that is not ours
+    for module in core imgproc imgcodecs videoio; do needs_package "libopencv-$module-dev"; done
     needs_package libgtest-dev
     needs_package libgmock-dev
     needs_package libcamera-dev       # without it the SDK is built without libcamera: cameras

@@ -65,7 +65,7 @@ MAQ_API maq_status maq_capture_get_drop(const maq_capture* capture, uint32_t ind
 /* Reads the photo of the view at `index`, below view_count, and undistorts it. The frame is MAQ_PIXEL_BGR8, in the size
  * of the view's camera. The caller owns `*frame`; give it to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED,
- * MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the photo is read. */
+ * MAQ_ERROR_IMAGE_SIZE. Blocks while the photo is read. */
 MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t index, maq_frame** frame);
 
 /* Reads the depth image of the view at `index`, below view_count, and its camera. MAQ_PIXEL_DEPTH32F is in units of the
@@ -73,8 +73,8 @@ MAQ_API maq_status maq_capture_load_view(const maq_capture* capture, uint32_t in
  * the pose of the photo and the size of the depth image. The caller sets camera->struct_size. The caller owns `*frame`;
  * give it to maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND (also: the view has no depth),
- * MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED (not a depth image, a lens with distortion), MAQ_ERROR_IMAGE_SIZE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the image is read. */
+ * MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED (not a depth image, a lens with distortion), MAQ_ERROR_IMAGE_SIZE.
+ * Blocks while the image is read. */
 MAQ_API maq_status maq_capture_load_depth(const maq_capture* capture, uint32_t index, maq_pinhole_camera* camera,
                                           maq_frame** frame);
 

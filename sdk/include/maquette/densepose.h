@@ -215,8 +215,8 @@ MAQ_API maq_status maq_densepose_result_draw(const maq_densepose_result* result,
  *   <path>_INDS.png  MAQ_DENSEPOSE_PLANE_PERSON
  *   <path>.json      size, boxes, scores
  * The folder of `path` must exist. Existing files are replaced atomically, after all three have been written.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (`path` is empty or ends with '/'), MAQ_ERROR_UNWRITABLE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while they are written. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (`path` is empty or ends with '/'), MAQ_ERROR_UNWRITABLE.
+ * Blocks while they are written. */
 MAQ_API maq_status maq_densepose_result_save(const maq_densepose_result* result, const char* path);
 
 /* The points of the template body in its rest pose, for each part, U and V. In metres: x to the body's left, y to its

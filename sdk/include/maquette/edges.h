@@ -137,8 +137,8 @@ MAQ_API maq_status maq_edges_result_get_stats(const maq_edges_result* result, ma
  *   <path>_kind.png       8 bits: maq_edges_kind
  *   <path>_edges.json     size, eps_r, intrinsics
  * Existing files are replaced atomically, after all three have been written.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (`path` is empty or ends with '/'), MAQ_ERROR_UNWRITABLE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it writes. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (`path` is empty or ends with '/'), MAQ_ERROR_UNWRITABLE.
+ * Blocks while it writes. */
 MAQ_API maq_status maq_edges_result_save(const maq_edges_result* result, const char* path);
 
 #ifdef __cplusplus

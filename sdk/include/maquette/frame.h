@@ -110,8 +110,7 @@ MAQ_API maq_status maq_frame_convert_yuv(maq_context* context, const maq_yuv_ima
  * MAQ_CLOCK_MEDIA, made upright by its EXIF orientation. `data` may be freed afterwards.
  * The caller owns `*frame`: release it with maq_frame_release.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNREADABLE (damaged, truncated or no image),
- * MAQ_ERROR_UNSUPPORTED (another format), MAQ_ERROR_IMAGE_SIZE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is
- * missing; all formats but JPEG need it). Blocks while it decodes. */
+ * MAQ_ERROR_UNSUPPORTED (another format), MAQ_ERROR_IMAGE_SIZE. Blocks while it decodes. */
 MAQ_API maq_status maq_frame_decode(maq_context* context, const void* data, size_t size_bytes, maq_frame** frame);
 
 /* Returns the frame to its pool or to the app (NULL is fine). Pointers into it are invalid afterwards.
@@ -179,7 +178,7 @@ MAQ_API maq_status maq_frame_resize(const maq_frame* frame, int32_t width_px, in
  *           .tif and .tiff, metres as floats (image: with depth_unit=1)
  * The depth that came with a colour image is not written. To write it, wrap the result of maq_frame_get_depth.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNSUPPORTED (depth in builds for
- * Android), MAQ_ERROR_UNWRITABLE, MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while it
+ * Android), MAQ_ERROR_UNWRITABLE. Blocks while it
  * writes. */
 MAQ_API maq_status maq_frame_save(const maq_frame* frame, const char* path);
 

@@ -49,8 +49,8 @@ MAQ_API maq_status maq_image_get_plane(const maq_image* image, maq_image_plane p
 
 /* Writes the colours to a file. The extension of `path` chooses the format: PNG (.png), lossless, or JPEG (.jpg, .jpeg)
  * at quality 95. The file appears atomically and replaces an existing file; its folder must exist.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension, alpha in a JPEG file), MAQ_ERROR_UNWRITABLE,
- * MAQ_ERROR_RUNTIME_LIBRARY (libmaquette_files.so is missing). Blocks while the file is written. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension, alpha in a JPEG file), MAQ_ERROR_UNWRITABLE.
+ * Blocks while the file is written. */
 MAQ_API maq_status maq_image_save(const maq_image* image, const char* path, maq_image_alpha alpha);
 
 /* Gives the image back to the pool of its renderer (NULL is fine). Pointers into it are invalid afterwards.

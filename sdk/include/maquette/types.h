@@ -37,7 +37,7 @@ typedef enum maq_status {
   MAQ_ERROR_IMAGE_SIZE = 5,       /* an image has no pixels, or more than the limits in frame.h */
   MAQ_ERROR_BAD_BUNDLE = 6,       /* a model bundle is incomplete or changed, or contradicts its manifest */
   MAQ_ERROR_UNSUPPORTED = 7,      /* this build or version cannot do it: unknown URI scheme, pixel format */
-  MAQ_ERROR_RUNTIME_LIBRARY = 8,  /* ONNX Runtime or libmaquette_files.so: not found, cannot be opened, or too old */
+  MAQ_ERROR_RUNTIME_LIBRARY = 8,  /* ONNX Runtime: not found, cannot be opened, or too old; clips: no ffmpeg */
   MAQ_ERROR_POOL_EMPTY = 9,       /* every frame or result of the pool is still held: release one */
   MAQ_ERROR_INFERENCE = 10,       /* a network failed to run */
   MAQ_ERROR_OUT_OF_MEMORY = 11,   /* no memory, or no thread or event is left: limits of the user or the container */

@@ -1,6 +1,6 @@
 #include "api/boundary.h"
 #include "api/frame_handle.h"
-#include "image/files/clip_writer.h"
+#include "image/clips/clip_writer.h"
 #include "maquette/clip.h"
 
 using namespace maq;

@@ -5,7 +5,7 @@
 #include "core/error.h"
 #include "core/files/atomic_file.h"
 #include "core/json/json_text.h"
-#include "image/files/file_codecs.h"
+#include "image/files/image_codecs.h"
 #include "image/files/image_file.h"
 
 namespace maq {
@@ -27,11 +27,7 @@ std::vector<uint8_t> distance_png(const EdgeField& field) {
   std::vector<uint16_t> units(field.distance_r.size());
   for (size_t i = 0; i < units.size(); ++i) units[i] = uint16_t(std::lround(double(field.distance_r[i]) / kUnit_r));
   const auto* const bytes = reinterpret_cast<const uint8_t*>(units.data());
-  std::vector<uint8_t> png;
-  if (!file_codecs().encode_depth(".png", packed_view(MAQ_PIXEL_DEPTH16, field.width, field.height, bytes), png)) {
-    throw Error(MAQ_ERROR_INTERNAL, "The distances could not be encoded as PNG.");
-  }
-  return png;
+  return encode_depth_image(".png", packed_view(MAQ_PIXEL_DEPTH16, field.width, field.height, bytes));
 }
 
 }  // namespace

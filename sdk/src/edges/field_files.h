@@ -8,7 +8,7 @@
 namespace maq {
 
 // Writes <path>_distance.png (16 bits, thousandths of r), <path>_kind.png and <path>_edges.json. Each appears
-// atomically, and none before all are written. Throws MAQ_ERROR_UNWRITABLE and the errors of file_codecs() and
+// atomically, and none before all are written. Throws MAQ_ERROR_UNWRITABLE and the errors of encode_depth_image() and
 // encode_image().
 void write_field_files(const EdgeField& field, const std::string& path);
 

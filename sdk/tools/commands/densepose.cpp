@@ -107,13 +107,13 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
   densepose.reset();
   const bool of_clip = is_clip(source);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"),
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"),
                 source.info().fps / double(options.limits.every));
   const auto work = [&](const SourceFrame& given) {
     const maquette::DensePoseResult result = densepose.run(given.frame);
     const maq_densepose_stats stats = result.stats();
     // Drawn before the first file is written, so that a frame has all its files or none.
-    cv::Mat overlay;
+    Canvas overlay;
     if (options.overlay && options.colours == "default") {
       overlay = draw_overlay(image_of(given.frame), result);
     } else if (options.overlay) {

@@ -140,14 +140,14 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
                 maquette::Source& source, maquette::Edges& edges) {
   require_intrinsics(argument, source);
   const bool of_clip = is_clip(source);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay"),
+  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"),
                 source.info().fps / double(options.limits.every));
   const bool prints = !of_clip || options.json || options.boxes;
   const auto work = [&](const SourceFrame& given) {
     const maquette::EdgesResult result = edges.run(given.frame);
     // The overlay is drawn before the first file is written, so that a frame has all its files or none.
     const FoundCurves found = find_curves(options, result);
-    cv::Mat overlay = options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : cv::Mat();
+    Canvas overlay = options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : Canvas();
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
     if (!options.out.empty()) {
       const fs::path path = fs::path(options.out) / given.stem;

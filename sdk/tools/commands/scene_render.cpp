@@ -5,8 +5,6 @@
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -56,13 +54,6 @@ maquette::SceneRenderer make_renderer(const maquette::Context& context, const ma
   config.model.threads = options.threads;
   config.near_depth = options.near_depth;
   return maquette::SceneRenderer(context, config, scene);
-}
-
-// The colours of the image, without a copy.
-cv::Mat colours_of(const maquette::Image& image) {
-  size_t stride_bytes = 0;
-  const void* pixels = image.plane(MAQ_IMAGE_PLANE_BGR, &stride_bytes);
-  return cv::Mat(image.height_px(), image.width_px(), CV_8UC3, const_cast<void*>(pixels), stride_bytes);
 }
 
 float median(std::vector<float> values) {
@@ -190,7 +181,7 @@ int render_clip(const maquette::Context& context, maquette::SceneRenderer& rende
   std::vector<float> times_ms;
   for (size_t i = 0; i < cameras.size() && !interrupted(); ++i) {
     const maquette::Image image = renderer.run(cameras[i]);
-    clip.add(frame_of(context, colours_of(image)));
+    clip.add(frame_of(context, image));
     times_ms.push_back(image.scene_stats().total_ms);
     char note[32];
     std::snprintf(note, sizeof note, "%.1f ms", double(times_ms.back()));
@@ -240,7 +231,7 @@ void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = scene.add_subcommand("render", "Render a scene: images from given cameras, or a clip");
   command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
-  command->add_option("-o,--out", options->out, "File of the clip, clip.mp4 or clip.avi, or folder for the images")
+  command->add_option("-o,--out", options->out, "File of the clip, such as clip.mp4, or folder for the images")
       ->required();
   command
       ->add_option("--path", options->path,

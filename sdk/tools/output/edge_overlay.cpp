@@ -3,7 +3,8 @@
 #include <app/edge_picture.h>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <cstdio>
+#include <string>
 #include <vector>
 
 namespace {
@@ -12,38 +13,33 @@ constexpr int kReadableSidePx = 900;
 constexpr int kLargestEnlargement = 4;
 constexpr float kLine_r = 1.5f;         // half the width of a line
 constexpr float kFieldStrength = 0.4f;  // under curves
-const cv::Vec3f kCrease(60, 235, 255), kBoundary(255, 255, 255), kInk(30, 20, 20);
-const cv::Scalar kDark(20, 15, 15);
-constexpr int kSubpixelBits = 4;
+constexpr Bgr kCrease = {60, 235, 255}, kBoundary = {255, 255, 255}, kInk = {30, 20, 20}, kDark = {20, 15, 15};
 
-cv::Mat plane_of(const maquette::EdgesResult& result, int type, const void* values) {
-  return cv::Mat(result.height_px(), result.width_px(), type, const_cast<void*>(values));
-}
-
-cv::Scalar bgr(const maquette::Rgb& colour) { return {double(colour.b), double(colour.g), double(colour.r)}; }
+constexpr Bgr bgr(const maquette::Rgb& colour) { return {colour.b, colour.g, colour.r}; }
 
 // Draws what is in space onto the enlarged image.
 class Drawing {
  public:
-  Drawing(cv::Mat& canvas, const maq_intrinsics& camera, int scale) : canvas_(canvas), camera_(camera), scale_(scale) {}
+  Drawing(Canvas& canvas, const maq_intrinsics& camera, int scale) : canvas_(canvas), camera_(camera), scale_(scale) {}
 
-  void curve(const double* points_m, size_t count, const cv::Scalar& colour) {
+  void curve(const double* points_m, size_t count, Bgr colour) {
     polyline(points_m, count, kDark, 4);
     polyline(points_m, count, colour, 2);
   }
 
-  void polyline(const double* points_m, size_t count, const cv::Scalar& colour, int width) {
-    std::vector<cv::Point> line;
-    for (size_t i = 0; i < count; ++i) {
-      if (points_m[3 * i + 2] > 0) line.push_back(fixed(points_m + 3 * i));
+  void polyline(const double* points_m, size_t count, Bgr colour, int width) {
+    const double* before = nullptr;
+    for (const double* point = points_m; point < points_m + 3 * count; point += 3) {
+      if (!(point[2] > 0)) continue;
+      if (before != nullptr) canvas_.line(seen(before), seen(point), width, colour);
+      before = point;
     }
-    cv::polylines(canvas_, line, false, colour, width, cv::LINE_AA, kSubpixelBits);
   }
 
-  void dot(const double* point_m, const cv::Scalar& colour, int radius) {
+  void dot(const double* point_m, Bgr colour, int radius) {
     if (!(point_m[2] > 0)) return;
-    cv::circle(canvas_, fixed(point_m), (radius + 1) << kSubpixelBits, kDark, cv::FILLED, cv::LINE_AA, kSubpixelBits);
-    cv::circle(canvas_, fixed(point_m), radius << kSubpixelBits, colour, cv::FILLED, cv::LINE_AA, kSubpixelBits);
+    canvas_.disc(seen(point_m), radius + 1, kDark);
+    canvas_.disc(seen(point_m), radius, colour);
   }
 
   void outline(const maquette::BoxLines& lines) {
@@ -53,62 +49,60 @@ class Drawing {
   void lengths(const maquette::BoxLines& lines, const maq_edges_box& box) {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double* const at = lines.labels[axis].data();
-      if (at[2] > 0) label(at, cv::format("%.0f", 1e3 * box.size_m[axis]));
+      char text[32];
+      std::snprintf(text, sizeof text, "%.0f", 1e3 * box.size_m[axis]);
+      if (at[2] > 0) label(at, text);
     }
   }
 
  private:
   void label(const double* point_m, const std::string& text) {
-    const double size = std::max(0.5, canvas_.cols / 1400.0);
-    int baseline = 0;
-    const cv::Size box = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 2, &baseline);
-    const cv::Point at = fixed(point_m) / (1 << kSubpixelBits) + cv::Point(-box.width / 2, box.height / 2);
-    cv::putText(canvas_, text, at, cv::FONT_HERSHEY_SIMPLEX, size, kDark, 5, cv::LINE_AA);
-    cv::putText(canvas_, text, at, cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar::all(255), 2, cv::LINE_AA);
+    const int point_px = std::max(2, canvas_.width() / 500);
+    const PictureSide size = Canvas::text_size(text, point_px);
+    const CanvasPoint middle = seen(point_m);
+    const int x = int(middle.x) - size.width / 2, y = int(middle.y) - size.height / 2;
+    for (int dy = -2; dy <= 2; ++dy) {
+      for (int dx = -2; dx <= 2; ++dx) canvas_.text(text, x + dx, y + dy, point_px, kDark);
+    }
+    canvas_.text(text, x, y, point_px, {255, 255, 255});
   }
 
   // Pixels of the field are squares of `scale` pixels; what is far outside of the image is drawn no farther.
-  cv::Point fixed(const double* p) const {
+  CanvasPoint seen(const double* p) const {
     const auto at = [&](double field_px, int side) {
-      const double px = (field_px + 0.5) * scale_ - 0.5;
-      return int(std::lround(std::clamp(px, -4.0 * side, 5.0 * side) * (1 << kSubpixelBits)));
+      return std::clamp((field_px + 0.5) * scale_ - 0.5, -4.0 * side, 5.0 * side);
     };
-    const maquette::Pixel seen = maquette::pixel_of(camera_, p);
-    return {at(seen[0], canvas_.cols), at(seen[1], canvas_.rows)};
+    const maquette::Pixel pixel = maquette::pixel_of(camera_, p);
+    return {at(pixel[0], canvas_.width()), at(pixel[1], canvas_.height())};
   }
 
-  cv::Mat& canvas_;
+  Canvas& canvas_;
   const maq_intrinsics& camera_;
   int scale_;
 };
 
 }  // namespace
 
-cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector<maq_edges_curve>& curves,
-                          const std::vector<maq_edges_corner>& corners, const std::vector<maq_edges_box>& boxes) {
+Canvas draw_edge_overlay(const maquette::EdgesResult& result, const std::vector<maq_edges_curve>& curves,
+                         const std::vector<maq_edges_corner>& corners, const std::vector<maq_edges_box>& boxes) {
   maquette::RgbaImage layer;
   maquette::draw_edge_layer(result, maquette::EdgeLayer::kDepth, &layer);
-  cv::Mat picture;
-  cv::cvtColor(plane_of(result, CV_8UC4, layer.rgba.data()), picture, cv::COLOR_RGBA2BGR);
-  const int scale = std::clamp(kReadableSidePx / std::max(picture.cols, picture.rows), 1, kLargestEnlargement);
-  const cv::Size size = picture.size() * scale;
-  cv::Mat canvas, distance, kind;
-  cv::resize(picture, canvas, size, 0, 0, cv::INTER_NEAREST);
-  cv::resize(plane_of(result, CV_32F, result.distance_r()), distance, size, 0, 0, cv::INTER_LINEAR);
-  cv::resize(plane_of(result, CV_8U, result.kind()), kind, size, 0, 0, cv::INTER_NEAREST);
-  for (int y = 0; y < canvas.rows; ++y) {
-    for (int x = 0; x < canvas.cols; ++x) {
-      const uint8_t which = kind.at<uint8_t>(y, x);
+  const PictureSide field{result.width_px(), result.height_px()};
+  const int scale = std::clamp(kReadableSidePx / std::max(field.width, field.height), 1, kLargestEnlargement);
+  Canvas canvas({field.width * scale, field.height * scale});
+  FloatPlane distance(field);
+  std::copy_n(result.distance_r(), distance.values.size(), distance.values.begin());
+  distance = distance.resized(canvas.size());
+  for (int y = 0; y < canvas.height(); ++y) {
+    for (int x = 0; x < canvas.width(); ++x) {
+      const size_t at = size_t(y / scale) * size_t(field.width) + size_t(x / scale);
+      for (size_t c = 0; c < 3; ++c) canvas.at(x, y)[c] = layer.rgba[4 * at + 2 - c];
+      const uint8_t which = result.kind()[at];
       if (which == MAQ_EDGES_KIND_NONE) continue;
-      const float from_r = distance.at<float>(y, x);
-      cv::Vec3b& pixel = canvas.at<cv::Vec3b>(y, x);
-      const auto mix = [&](const cv::Vec3f& colour, float amount) {
-        pixel = cv::Vec3b(cv::Vec3f(pixel) + (colour - cv::Vec3f(pixel)) * std::clamp(amount, 0.0f, 1.0f));
-      };
-      const float strength = curves.empty() ? 1 : kFieldStrength;
-      mix(kInk, strength * 0.5f * (2 - from_r / kLine_r));
-      mix(which == MAQ_EDGES_KIND_CREASE ? kCrease : kBoundary,
-          strength * std::clamp(2 * (1.25f - from_r / kLine_r), 0.0f, 1.0f));
+      const float from_r = distance.at(x, y), strength = curves.empty() ? 1 : kFieldStrength;
+      canvas.mix(x, y, kInk, std::clamp(strength * 0.5f * (2 - from_r / kLine_r), 0.0f, 1.0f));
+      canvas.mix(x, y, which == MAQ_EDGES_KIND_CREASE ? kCrease : kBoundary,
+                 strength * std::clamp(2 * (1.25f - from_r / kLine_r), 0.0f, 1.0f));
     }
   }
   Drawing drawing(canvas, result.field().intrinsics, scale);

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
 #include <vector>
 
-// BGR. Small fields are enlarged by a whole number. Near is red, far is blue, unknown is black. Where the field is
+#include "output/canvas.h"
+
+// Small fields are enlarged by a whole number. Near is red, far is blue, unknown is black. Where the field is
 // under 1.5 r it is tinted, yellow for creases and white for boundaries; so are the lines of `curves`, of which concave
 // creases are green, with a dot at each corner. Each of `boxes` has its outline, and on it the three lengths in
 // millimetres.
-cv::Mat draw_edge_overlay(const maquette::EdgesResult& result, const std::vector<maq_edges_curve>& curves,
-                          const std::vector<maq_edges_corner>& corners, const std::vector<maq_edges_box>& boxes);
+Canvas draw_edge_overlay(const maquette::EdgesResult& result, const std::vector<maq_edges_curve>& curves,
+                         const std::vector<maq_edges_corner>& corners, const std::vector<maq_edges_box>& boxes);

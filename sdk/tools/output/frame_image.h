@@ -1,11 +1,14 @@
-// Between frames of the SDK and images of OpenCV, which the programs draw on.
+// Between frames of the SDK and images that the programs draw on.
 #pragma once
 
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
 
-// BGR, a copy.
-cv::Mat image_of(const maquette::Frame& frame);
+#include "output/canvas.h"
 
-// Wraps the image's memory, which must stay until the frame is gone. BGR.
-maquette::Frame frame_of(const maquette::Context& context, const cv::Mat& image);
+// A copy.
+Canvas image_of(const maquette::Frame& frame);
+
+// Wraps the image's memory, which must stay until the frame is gone.
+maquette::Frame frame_of(const maquette::Context& context, const Canvas& image);
+// The colours of a rendered image.
+maquette::Frame frame_of(const maquette::Context& context, const maquette::Image& image);

@@ -3,19 +3,20 @@
 
 #include <deque>
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
 #include <vector>
+
+#include "output/canvas.h"
 
 class NoveltyImage {
  public:
-  // Returns a BGR image: the frame with novel cells in red, its reconstruction, and below them the bits of all frames
+  // Returns an image: the frame with novel cells in red, its reconstruction, and below them the bits of all frames
   // with their events. All images have the size of the first.
-  cv::Mat draw(const maquette::Frame& frame, const maquette::Frame& reconstruction, const maq_novelty_score& score,
-               const std::vector<float>& map);
+  Canvas draw(const maquette::Frame& frame, const maquette::Frame& reconstruction, const maq_novelty_score& score,
+              const std::vector<float>& map);
 
  private:
-  void draw_curve(cv::Mat& strip) const;
+  void draw_curve(Canvas& strip) const;
 
-  cv::Size half_;  // of the frame and of its reconstruction
+  PictureSide half_;  // of the frame and of its reconstruction
   std::deque<maq_novelty_score> scores_;
 };

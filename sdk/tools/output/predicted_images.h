@@ -4,9 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+
+#include "output/canvas.h"
 
 class PredictedImages {
  public:
@@ -14,12 +15,11 @@ class PredictedImages {
   PredictedImages(const maquette::Context& context, const std::string& out, const std::string& stem, double fps);
 
   bool is_clip() const { return clip_.has_value(); }
-  // Returns the size of each of `columns` images side by side: `size`, or less if the row would not fit into the clip
-  // or into a frame.
-  cv::Size size_in_row(cv::Size size, size_t columns) const;
-  void add_to_clip(const cv::Mat& image);  // scaled down if it does not fit
+  // Returns the size of each of `columns` images side by side: `size`, or less if the row would not fit into a frame.
+  static PictureSide size_in_row(PictureSide size, size_t columns);
+  void add_to_clip(const Canvas& image);
   // Saves the frame, with the mark inside the file, or the images side by side. `sample`: 0-based; -1: none.
-  void save(int64_t number, const maquette::Frame& frame, const cv::Mat* compared, int sample = -1);
+  void save(int64_t number, const maquette::Frame& frame, const Canvas* compared, int sample = -1);
   // Returns the name of the clip or folder; "" if nothing was written.
   std::string finish();
 

@@ -2,32 +2,31 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <opencv2/imgproc.hpp>
 
 namespace {
 
-const cv::Scalar kMarkColour(255, 0, 255);  // magenta: rare in images
+constexpr Bgr kMarkColour = {255, 0, 255};  // magenta: rare in images
 constexpr int kMinSideOfText_px = 100;
 
 }  // namespace
 
-void draw_caption(const std::string& text, cv::Mat& image) {
-  if (image.cols < kMinSideOfText_px) return;
-  const double scale = std::max(0.4, image.rows / 800.0);
-  const int thickness = scale > 0.8 ? 2 : 1;
-  int below = 0;
-  const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, &below);
-  cv::rectangle(image, cv::Rect(0, 0, size.width + 12, size.height + below + 10), cv::Scalar(), cv::FILLED);
-  cv::putText(image, text, cv::Point(6, size.height + 6), cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(255, 255, 255),
-              thickness, cv::LINE_AA);
+void draw_caption(const std::string& text, Canvas& image) {
+  if (image.width() < kMinSideOfText_px) return;
+  const int point_px = std::max(1, image.height() / 360);
+  const PictureSide size = Canvas::text_size(text, point_px);
+  image.fill(0, 0, {size.width + 12, size.height + 10}, {});
+  image.text(text, 6, 5, point_px, {255, 255, 255});
 }
 
-void draw_prediction_mark(const maquette::Frame& frame, cv::Mat& image) {
+void draw_prediction_mark(const maquette::Frame& frame, Canvas& image) {
   const maq_frame_origin origin = frame.origin();
   if (origin.kind != MAQ_FRAME_PREDICTED) return;
   char text[64];
   std::snprintf(text, sizeof text, "predicted +%lld ms", (long long)(origin.horizon_ns / 1000000));
   draw_caption(text, image);
-  const int width = std::max(1, std::min(image.cols, image.rows) / 60);
-  cv::rectangle(image, cv::Rect(0, 0, image.cols, image.rows), kMarkColour, 2 * width - 1);
+  const int width = std::max(1, std::min(image.width(), image.height()) / 60);
+  image.fill(0, 0, {image.width(), width}, kMarkColour);
+  image.fill(0, image.height() - width, {image.width(), width}, kMarkColour);
+  image.fill(0, 0, {width, image.height()}, kMarkColour);
+  image.fill(image.width() - width, 0, {width, image.height()}, kMarkColour);
 }

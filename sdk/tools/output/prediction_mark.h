@@ -2,10 +2,12 @@
 #pragma once
 
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
+#include <string>
 
-// Draws a border and, if there is room, the time ahead; nothing for a captured frame. BGR.
-void draw_prediction_mark(const maquette::Frame& frame, cv::Mat& image);
+#include "output/canvas.h"
+
+// Draws a border and, if there is room, the time ahead; nothing for a captured frame.
+void draw_prediction_mark(const maquette::Frame& frame, Canvas& image);
 
 // Draws a line of text at the top, white on black.
-void draw_caption(const std::string& text, cv::Mat& image);
+void draw_caption(const std::string& text, Canvas& image);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 namespace {
@@ -46,15 +45,19 @@ std::vector<float> SampledFrames::entropy_map(int64_t number) const {
   return mean;
 }
 
-cv::Mat draw_entropy_map(const std::vector<float>& bits, const cv::Mat& image) {
+Canvas draw_entropy_map(const std::vector<float>& bits, const Canvas& image) {
   const int side = int(std::lround(std::sqrt(double(bits.size()))));
-  cv::Mat cells(side, side, CV_32F), redness, drawn = image.clone();
-  std::transform(bits.begin(), bits.end(), cells.begin<float>(),
+  FloatPlane cells({side, side});
+  std::transform(bits.begin(), bits.end(), cells.values.begin(),
                  [](float own) { return 0.8f * std::min(own / kFullRed_bits, 1.0f); });
-  cv::resize(cells, redness, image.size(), 0, 0, cv::INTER_LINEAR);
-  drawn.forEach<cv::Vec3b>([&](cv::Vec3b& pixel, const int* at) {
-    const float red = redness.at<float>(at[0], at[1]);
-    for (int c = 0; c < 3; ++c) pixel[c] = uint8_t(float(pixel[c]) * (1 - red) + (c == 2 ? 255 * red : 0));
-  });
+  Canvas drawn = image;
+  redden(cells, drawn);
   return drawn;
+}
+
+void redden(const FloatPlane& cells, Canvas& image) {
+  const FloatPlane redness = cells.resized(image.size());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) image.mix(x, y, {0, 0, 255}, redness.at(x, y));
+  }
 }

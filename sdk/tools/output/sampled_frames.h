@@ -3,9 +3,10 @@
 
 #include <cstdint>
 #include <maquette/maquette.hpp>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
+
+#include "output/canvas.h"
 
 struct SampleOptions {
   int samples = 0;  // 0: none
@@ -43,5 +44,8 @@ class SampledFrames {
   int64_t steps_a_frame_ = 1;
 };
 
-// Returns the BGR image with uncertain cells in red.
-cv::Mat draw_entropy_map(const std::vector<float>& bits, const cv::Mat& image);
+// Returns the image with uncertain cells in red.
+Canvas draw_entropy_map(const std::vector<float>& bits, const Canvas& image);
+
+// Mixes red into the image: `cells` are from 0 to 1.
+void redden(const FloatPlane& cells, Canvas& image);

@@ -3,8 +3,9 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "image/clips/clip_reader.h"
+#include "image/clips/vp9_encoder.h"
 #include "image/files/android/android_images.h"
-#include "image/files/file_codecs.h"
 #include "image/files/image_file.h"
 #include "support/expect_error.h"
 #include "support/samples/encoded_images.h"
@@ -127,9 +128,8 @@ TEST_F(AndroidImages, ThatAndroidDoesNotReadSayWhatToDo) {
   const Bytes tiff = encoded(".tiff", smooth(70, 40));
   expect_error(MAQ_ERROR_UNSUPPORTED, "TIFF images are not read on Android",
                [&] { decoded(tiff, maq::Orientation::kUpright); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "MediaCodec", [] { maq::file_codecs().open_clip("clip.mp4"); });
-  expect_error(MAQ_ERROR_UNSUPPORTED, "MediaCodec",
-               [] { maq::file_codecs().begin_clip("clip.mp4", maq::ClipFormat::kMpeg4, 30, 64, 48); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "MediaCodec", [] { maq::ClipReader("clip.mp4"); });
+  expect_error(MAQ_ERROR_UNSUPPORTED, "MediaCodec", [] { maq::Vp9Encoder(64, 48); });
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ class ApiClips : public ::testing::Test {
 };
 
 TEST_F(ApiClips, AClipOfOddPicturesIsSeenAsItWasAdded) {
-  for (const char* name : {"a.mp4", "a.avi", "b.MP4"}) {
+  for (const char* name : {"a.mp4", "b.MP4"}) {
     write(folder_.file(name), 7);
     maquette::Source source(context_, std::string("video:") + folder_.file(name));
     EXPECT_EQ(source.info().width_px, 64) << "an odd side loses its last column";
@@ -63,7 +63,7 @@ TEST_F(ApiClips, AClipOfOddPicturesIsSeenAsItWasAdded) {
     }
     EXPECT_FALSE(source.next());
   }
-  EXPECT_EQ(files_in(folder_.path()), 3u);
+  EXPECT_EQ(files_in(folder_.path()), 2u);
 }
 
 TEST_F(ApiClips, ThePartThatIsLeftOutIsAtTheRightAndAtTheBottom) {
@@ -73,10 +73,10 @@ TEST_F(ApiClips, ThePartThatIsLeftOutIsAtTheRightAndAtTheBottom) {
       if (x == 32 || y == 16) std::fill_n(&pixels[(y * 33 + x) * 3], 3, uint8_t(0));
     }
   }
-  maquette::Clip clip(context_, folder_.file("a.avi"), 25);
+  maquette::Clip clip(context_, folder_.file("a.mp4"), 25);
   clip.add(maquette::Frame(context_, describe(MAQ_PIXEL_RGB8, pixels, 33, 17)));
   clip.finish();
-  const std::vector<uint8_t> seen = rgb_of(*maquette::Source(context_, "video:" + folder_.file("a.avi")).next());
+  const std::vector<uint8_t> seen = rgb_of(*maquette::Source(context_, "video:" + folder_.file("a.mp4")).next());
   ASSERT_EQ(seen.size(), 32u * 16 * 3);
   for (const uint8_t value : seen) EXPECT_NEAR(value, 200, 8);
 }
@@ -125,50 +125,45 @@ TEST_F(ApiClips, AfterTheEndNothingCanBeAdded) {
 }
 
 TEST_F(ApiClips, AFullDiskIsToldAndLeavesTheOldFile) {
-  for (const char* name : {"a.mp4", "a.avi"}) {
-    const std::string path = folder_.file(name);
-    {
-      maquette::Clip clip(context_, path, 10);
-      for (int k = 0; k < 20; ++k) clip.add(noise(k));
-      clip.finish();
-    }
-    const rlim_t whole = std::filesystem::file_size(path);
-    std::filesystem::remove(path);
-    write(path, 2);
-    // In the head, among the images, in the index behind them, at the last byte.
-    for (const rlim_t most : {rlim_t(0), rlim_t(20), rlim_t(10'000), whole / 2, whole - 200, whole - 1}) {
-      maquette::Clip clip(context_, path, 10);
-      const FileSizeLimit full(most);
-      maq_status first = MAQ_OK;
-      for (int k = 0; k < 20 && first == MAQ_OK; ++k) {
-        const maquette::Frame frame = noise(k);
-        first = maq_clip_add_frame(clip.get(), frame.get());
-      }
-      if (first == MAQ_OK) first = maq_clip_finish(clip.get());
-      EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << name << ' ' << most << ": " << maq_last_error(clip.get());
-      EXPECT_NE(maq_clip_finish(clip.get()), MAQ_OK) << "nor the second time";
-    }
-    EXPECT_EQ(frames_of(path), 2) << name;
-    std::filesystem::remove(path);
-    EXPECT_EQ(files_in(folder_.path()), 0u) << "nothing is left over";
+  const std::string path = folder_.file("a.mp4");
+  {
+    maquette::Clip clip(context_, path, 10);
+    for (int k = 0; k < 20; ++k) clip.add(noise(k));
+    clip.finish();
   }
+  const rlim_t whole = std::filesystem::file_size(path);
+  std::filesystem::remove(path);
+  write(path, 2);
+  // In the head, among the images, in the index behind them, at the last byte.
+  for (const rlim_t most : {rlim_t(0), rlim_t(20), rlim_t(10'000), whole / 2, whole - 200, whole - 1}) {
+    maquette::Clip clip(context_, path, 10);
+    const FileSizeLimit full(most);
+    maq_status first = MAQ_OK;
+    for (int k = 0; k < 20 && first == MAQ_OK; ++k) {
+      const maquette::Frame frame = noise(k);
+      first = maq_clip_add_frame(clip.get(), frame.get());
+    }
+    if (first == MAQ_OK) first = maq_clip_finish(clip.get());
+    EXPECT_EQ(first, MAQ_ERROR_UNWRITABLE) << most << ": " << maq_last_error(clip.get());
+    EXPECT_NE(maq_clip_finish(clip.get()), MAQ_OK) << "nor the second time";
+  }
+  EXPECT_EQ(frames_of(path), 2);
+  std::filesystem::remove(path);
+  EXPECT_EQ(files_in(folder_.path()), 0u) << "nothing is left over";
 }
 
 TEST_F(ApiClips, RatesAreKept) {
-  for (const char* name : {"a.mp4", "a.avi"}) {
-    for (const double fps : {0.01, 0.5, 23.976, 29.97, 59.94, 65.6, 119.88, 143.857, 655.351, 1000.0}) {
-      maquette::Clip clip(context_, folder_.file(name), fps);
-      for (int k = 0; k < 3; ++k) clip.add(picture(k));
-      clip.finish();
-      EXPECT_NEAR(maquette::Source(context_, std::string("video:") + folder_.file(name)).info().fps, fps, fps * 2e-3)
-          << name;
-    }
+  for (const double fps : {0.01, 0.5, 23.976, 29.97, 59.94, 65.6, 119.88, 143.857, 655.351, 1000.0}) {
+    maquette::Clip clip(context_, folder_.file("a.mp4"), fps);
+    for (int k = 0; k < 3; ++k) clip.add(picture(k));
+    clip.finish();
+    EXPECT_NEAR(maquette::Source(context_, std::string("video:") + folder_.file("a.mp4")).info().fps, fps, fps * 2e-3);
   }
 }
 
 TEST_F(ApiClips, WhatIsNoClipIsRefusedAndLeavesNoFile) {
-  for (const char* name : {"a.mov", "a", ".mp4", "a.mp4/"}) {
-    expect_refused(folder_.file(name), 25, MAQ_ERROR_INVALID_ARGUMENT, "ends neither in .mp4 nor in .avi");
+  for (const char* name : {"a.avi", "a", ".mp4", "a.mp4/"}) {
+    expect_refused(folder_.file(name), 25, MAQ_ERROR_INVALID_ARGUMENT, "does not end in .mp4");
   }
   for (const double fps : {0.0, -1.0, 0.001, 1000.1, std::nan(""), HUGE_VAL}) {
     expect_refused(folder_.file("a.mp4"), fps, MAQ_ERROR_INVALID_ARGUMENT, "fps is");
@@ -190,9 +185,6 @@ TEST_F(ApiClips, PicturesThatFitNoClipAreRefusedByName) {
             MAQ_ERROR_UNSUPPORTED);
   EXPECT_EQ(status_of([&] { clip.add(picture(0, 1, 8)); }), MAQ_ERROR_IMAGE_SIZE);
   EXPECT_EQ(status_of([&] { clip.add(picture(0, 8, 1)); }), MAQ_ERROR_IMAGE_SIZE);
-  std::string text;
-  EXPECT_EQ(status_of([&] { clip.add(picture(0, 16384, 4)); }, &text), MAQ_ERROR_UNSUPPORTED);
-  EXPECT_NE(text.find("MPEG-4 of 16384 x 4"), std::string::npos) << text;
   clip.add(picture(0, 2, 2));
   clip.finish();
   EXPECT_EQ(frames_of(folder_.file("a.mp4")), 1);
@@ -202,10 +194,10 @@ TEST_F(ApiClips, APathIsNeverTakenForAnAddress) {
   const auto before = std::filesystem::current_path();
   std::filesystem::current_path(folder_.path());
   write("pipe:1.mp4", 3);
-  write("file:b.avi", 3);
+  write("file:b.mp4", 3);
   std::filesystem::current_path(before);
   EXPECT_EQ(frames_of(folder_.file("pipe:1.mp4")), 3);
-  EXPECT_EQ(frames_of(folder_.file("file:b.avi")), 3);
+  EXPECT_EQ(frames_of(folder_.file("file:b.mp4")), 3);
   EXPECT_EQ(files_in(folder_.path()), 2u);
 }
 

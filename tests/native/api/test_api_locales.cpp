@@ -62,7 +62,7 @@ class ApiLocales : public ::testing::Test {
 TEST_F(ApiLocales, ErrorsHaveTheNumbersOfC) {
   write_numbers_with_commas();
   maq_clip* clip = nullptr;
-  expect_error(maq_clip_create(context_.get(), "a.avi", 0.0025, &clip), "fps is 0.0025, but must be 0.01 to 1000.");
+  expect_error(maq_clip_create(context_.get(), "a.mp4", 0.0025, &clip), "fps is 0.0025, but must be 0.01 to 1000.");
   maq_source* source = nullptr;
   maq_source_config config = maquette::default_source_config();
   config.stall_ms = 1234567;

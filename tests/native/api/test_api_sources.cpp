@@ -87,14 +87,14 @@ TEST(ApiSources, NothingIsPrintedOfDamagedFiles) {
   const std::string media = MAQ_TEST_MEDIA;
   const maquette::Frame frame = *maquette::Source(context, "image:" + media + "/photo.jpg").next();
   frame.save(folder.file("a.png"));
-  maquette::Clip clip(context, folder.file("b.avi"), 10);
+  maquette::Clip clip(context, folder.file("b.mp4"), 10);
   for (int i = 0; i < 5; ++i) clip.add(frame);
   clip.finish();
   std::string bmp = std::string("BM\x36\x0c\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x20\0\0\0\x20\0\0\0\1\0\x18\0", 30);
   bmp.resize(54 + 32 * 32 * 3);
   testing::internal::CaptureStderr();
   for (const std::string& whole : {read_text(media + "/photo.jpg"), read_text(folder.file("a.png")), bmp,
-                                   read_text(media + "/clip.mp4"), read_text(folder.file("b.avi"))}) {
+                                   read_text(media + "/clip.mp4"), read_text(folder.file("b.mp4"))}) {
     for (int i = 1; i < 16; ++i) {
       std::string damaged = i % 2 == 0 ? whole.substr(0, whole.size() * size_t(i) / 16) : whole;
       for (size_t k = damaged.size() * size_t(i) / 17; k < damaged.size(); k += 4999) damaged[k] = char(damaged[k] + i);
@@ -279,27 +279,22 @@ class LoneCopy {
   maq_context* context_ = nullptr;
 };
 
-TEST(ApiSources, FilesNeedTheirLibraryAndNothingElseDoes) {
+TEST(ApiSources, ClipsNeedTheirProgramAndNothingElseDoes) {
   LoneCopy sdk;
-  const std::string image = "image:" + sdk.beside("a.png");
-  write_text(sdk.beside("a.png"), "\x89PNG\r\n\x1a\n");  // that it is damaged comes later
-  const std::string video = "video:" + sdk.beside("libmaquette.so");
+  ASSERT_EQ(setenv("MAQ_FFMPEG", sdk.beside("ffmpeg").c_str(), 1), 0);
   for (const char* uri : {"stub:pattern", "image:" MAQ_TEST_MEDIA "/photo.jpg"}) {
     EXPECT_EQ(sdk.open(uri), MAQ_OK) << sdk.last_error();
   }
-  for (const std::string& uri : {image, video}) {
-    EXPECT_EQ(sdk.open(uri.c_str()), MAQ_ERROR_RUNTIME_LIBRARY);
-    EXPECT_NE(sdk.last_error().find("maquette/libmaquette_files.so"), std::string::npos) << sdk.last_error();
-  }
-  EXPECT_EQ(sdk.open("stub:pattern"), MAQ_OK) << sdk.last_error();
+  EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_ERROR_RUNTIME_LIBRARY);
+  EXPECT_NE(sdk.last_error().find("needs the program " + sdk.beside("ffmpeg")), std::string::npos) << sdk.last_error();
+  // A program that does not decode is one that found no frame.
+  write_text(sdk.beside("ffmpeg"), "#!/bin/sh\necho nonsense\n");
+  std::filesystem::permissions(sdk.beside("ffmpeg"), std::filesystem::perms::owner_all);
+  EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_ERROR_UNREADABLE) << sdk.last_error();
+  ASSERT_EQ(unsetenv("MAQ_FFMPEG"), 0);
+  EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_OK) << sdk.last_error();
   EXPECT_EQ(sdk.open("stub:people"), MAQ_ERROR_NOT_FOUND) << "an app does not carry the sprites";
   EXPECT_NE(sdk.last_error().find("share/maquette/stub/people.jpg"), std::string::npos) << sdk.last_error();
-
-  std::filesystem::create_directory(sdk.beside("maquette"));
-  const std::string library = sdk.beside("maquette/libmaquette_files.so");
-  std::filesystem::copy_file(sdk.beside("libmaquette.so"), library);
-  EXPECT_EQ(sdk.open(image.c_str()), MAQ_ERROR_RUNTIME_LIBRARY) << "the SDK itself is not the library of files";
-  EXPECT_NE(sdk.last_error().find("install both from the same build"), std::string::npos) << sdk.last_error();
 }
 
 TEST(ApiSources, CamerasOfLibcameraNeedTheirLibraryAndTheListOfCamerasDoesNot) {

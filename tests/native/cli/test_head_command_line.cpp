@@ -144,10 +144,10 @@ TEST_F(HeadCommandLine, AHeadIsRenderedAsPicturesAndClips) {
   ASSERT_EQ(photo.exit_code, 0) << photo.err;
   EXPECT_EQ(cv::imread(folder_.file("over.png")).size(), cv::Size(320, 240));
 
-  const Outcome clip = run("render head.maqh --out c.avi --seconds 0.4 --fps 10 --size 64x48 --cell 6");
+  const Outcome clip = run("render head.maqh --out c.mp4 --seconds 0.4 --fps 10 --size 64x48 --cell 6");
   ASSERT_EQ(clip.exit_code, 0) << clip.err;
-  EXPECT_NE(clip.out.find("c.avi: 4 frames, "), std::string::npos) << clip.out;
-  cv::VideoCapture turn(folder_.file("c.avi"));
+  EXPECT_NE(clip.out.find("c.mp4: 4 frames, "), std::string::npos) << clip.out;
+  cv::VideoCapture turn(folder_.file("c.mp4"));
   cv::Mat first, second;
   ASSERT_TRUE(turn.read(first) && turn.read(second));
   EXPECT_GT(cv::norm(first, second, cv::NORM_INF), 40) << "it turns";
@@ -157,7 +157,7 @@ TEST_F(HeadCommandLine, WrongViewsOfAHeadAreASentence) {
   ASSERT_EQ(run("grey.png --box 110,60,200,180 --save head.maqh --seconds 0").exit_code, 0);
   expect_error("render head.maqh", 2, "--out is required");
   expect_error("render --out a.png", 2, "head is required");
-  expect_error("render head.maqh --out a.glb", 2, "must end with .png, .jpg, .mp4 or .avi");
+  expect_error("render head.maqh --out a.glb", 2, "must end with .png, .jpg or .mp4");
   expect_error("render head.maqh --out a.png --size big", 1, "--size big is not a size; write it as 640x480");
   expect_error("render head.maqh --out a.png --seconds 3", 1, "are for clips");
   expect_error("render head.maqh --out a.png --photo 2", 1, "so there is no photo 2");
@@ -165,7 +165,7 @@ TEST_F(HeadCommandLine, WrongViewsOfAHeadAreASentence) {
   expect_error("render head.maqh --out a.png --photo 1 --yaw 3", 1, "--photo is one view");
   expect_error("render head.maqh --out a.png --background 1,2,300", 2, "--background");
   expect_error("render grey.png --out a.png", 1, "grey.png");
-  expect_error("grey.png --preview turn.gif", 2, "must end with .png, .jpg, .mp4 or .avi");
+  expect_error("grey.png --preview turn.gif", 2, "must end with .png, .jpg or .mp4");
   EXPECT_FALSE(exists("a.png"));
 }
 

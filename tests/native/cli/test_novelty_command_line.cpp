@@ -86,10 +86,10 @@ TEST_F(NoveltyCommandLine, NamesTheEventsOfAClip) {
 }
 
 TEST_F(NoveltyCommandLine, DrawsTheScoresAsAClip) {
-  const Outcome result = run("square.avi --max-frames 8 --out o/novelty.avi");
+  const Outcome result = run("square.avi --max-frames 8 --out o/novelty.mp4");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find(" -> o/novelty.avi"), std::string::npos) << result.out;
-  cv::VideoCapture clip(folder_.file("o/novelty.avi"));
+  EXPECT_NE(result.out.find(" -> o/novelty.mp4"), std::string::npos) << result.out;
+  cv::VideoCapture clip(folder_.file("o/novelty.mp4"));
   int frames = 0;
   for (cv::Mat picture; clip.read(picture); ++frames) EXPECT_EQ(picture.size(), cv::Size(320, 120 + 64));
   EXPECT_EQ(frames, 8);
@@ -99,7 +99,7 @@ TEST_F(NoveltyCommandLine, WhatIsWrongIsOneSentence) {
   for (const char* wrong : {"square.avi --compare", "square.avi --threshold 1", "square.avi --max-frames 0"}) {
     EXPECT_EQ(run(wrong).exit_code, 2) << wrong;
   }
-  expect_failure("square.avi --out images", "ends in .mp4 or .avi");
+  expect_failure("square.avi --out images", "ends in .mp4");
   expect_failure("missing.avi", "missing.avi");
   expect_failure("square.avi --bundle nowhere", "nowhere");
   EXPECT_NE(run("--help").out.find("maquette novelty clip.mp4 --out novelty.mp4"), std::string::npos);

@@ -29,12 +29,12 @@ class PredictCommandLine : public ::testing::Test {
 };
 
 TEST_F(PredictCommandLine, ComparesTheMethodsAndDrawsThemBesideTheTruth) {
-  const Outcome result = run("square.avi --from 9 --frames 6 --compare --out o/next.avi");
+  const Outcome result = run("square.avi --from 9 --frames 6 --compare --out o/next.mp4");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NE(result.out.find("ahead"), std::string::npos);
   EXPECT_NE(result.out.find("300 ms"), std::string::npos) << result.out;
-  EXPECT_NE(result.out.find("6 predicted frames -> o/next.avi"), std::string::npos) << result.out;
-  cv::VideoCapture clip(folder_.file("o/next.avi"));
+  EXPECT_NE(result.out.find("6 predicted frames -> o/next.mp4"), std::string::npos) << result.out;
+  cv::VideoCapture clip(folder_.file("o/next.mp4"));
   int frames = 0;
   cv::Mat picture;
   while (clip.read(picture)) ++frames;
@@ -61,11 +61,11 @@ TEST_F(PredictCommandLine, ANetworkRefinesAuto) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return nlohmann::json::parse(result.out);
   };
-  const auto refined = figures("--method refined --out row.avi --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
+  const auto refined = figures("--method refined --out row.mp4 --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
   EXPECT_EQ(refined["method"], "refined");
   EXPECT_EQ(refined["frames"][0]["method"], "refined");
   EXPECT_NE(refined["frames"][0]["psnr_db"]["chosen"], figures("")["frames"][0]["psnr_db"]["chosen"]);
-  cv::VideoCapture clip(folder_.file("row.avi"));
+  cv::VideoCapture clip(folder_.file("row.mp4"));
   EXPECT_EQ(clip.get(cv::CAP_PROP_FRAME_WIDTH), 4 * 160) << "truth, last, motion and that";
   expect_failure("square.avi --compare --method refined --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'",
                  "no network for refined prediction");
@@ -82,9 +82,9 @@ TEST_F(PredictCommandLine, PicturesInAFolderAreMarkedInside) {
 }
 
 TEST_F(PredictCommandLine, PredictedFramesOfAClipHaveABorder) {
-  const Outcome result = run("square.avi --from 4 --frames 2 --out next.avi");
+  const Outcome result = run("square.avi --from 4 --frames 2 --out next.mp4");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  cv::VideoCapture clip(folder_.file("next.avi"));
+  cv::VideoCapture clip(folder_.file("next.mp4"));
   cv::Mat picture;
   for (int i = 0; i < 7; ++i) {
     ASSERT_TRUE(clip.read(picture));
@@ -102,14 +102,14 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return nlohmann::json::parse(result.out)["frames"];
   };
-  const auto first = figures("--out row.avi");
+  const auto first = figures("--out row.mp4");
   ASSERT_EQ(first.size(), 2u);
   for (const auto& frame : first) {
     ASSERT_EQ(frame["psnr_db"]["samples"].size(), 2u);
     EXPECT_NE(frame["psnr_db"]["samples"][0], frame["psnr_db"]["samples"][1]);
     EXPECT_GT(frame["entropy_bits"].get<double>(), 0.1);
   }
-  cv::VideoCapture clip(folder_.file("row.avi"));
+  cv::VideoCapture clip(folder_.file("row.mp4"));
   cv::Mat picture;
   ASSERT_TRUE(clip.read(picture));
   EXPECT_EQ(picture.cols, 7 * 160) << "truth, last, motion, auto, two samples, entropy";
@@ -131,15 +131,7 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
   expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");
 }
 
-TEST_F(PredictCommandLine, AComparisonThatNoClipTakesIsDrawnSmaller) {
-  const Outcome result =
-      run("'stub:people?size=2652x64&fps=30' --from 2 --frames 1 --compare --out wide.mp4");  // 10,608 pixels in a row
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  cv::VideoCapture clip(folder_.file("wide.mp4"));
-  cv::Mat picture;
-  ASSERT_TRUE(clip.read(picture));
-  EXPECT_EQ(picture.size(), cv::Size(8188, 48));
-  ASSERT_EQ(run("'stub:people?size=9000x64&fps=30' --from 2 --frames 1 --out alone.mp4").exit_code, 0);
+TEST_F(PredictCommandLine, AComparisonThatNoFrameTakesIsDrawnSmaller) {
   const Outcome rows = run("'stub:people?size=5000x64&fps=30' --from 2 --frames 1 --compare --out rows");
   ASSERT_EQ(rows.exit_code, 0) << rows.err;
   EXPECT_EQ(cv::imread(folder_.file("rows/stub_people_ahead_001.png")).cols, 4 * 4096);

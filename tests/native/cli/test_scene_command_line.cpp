@@ -156,15 +156,15 @@ TEST_F(SceneCommandLine, RendersClipsThatPlay) {
 TEST_F(SceneCommandLine, AClipHasTheNameThatWasGivenOrIsNotMade) {
   build();
   const std::string orbit = "render place.maqs --path orbit --seconds 0.2 --fps 10 ";
-  const Outcome avi = run(orbit + "--size 64x48 --out orbit.avi");
-  ASSERT_EQ(avi.exit_code, 0) << avi.err;
-  EXPECT_EQ(frames_of("orbit.avi", 64, 48), 2);
-  for (const char* name : {"orbit.mov", "orbit"}) {
-    expect_failure(orbit + "--size 64x48 --out " + name, std::string(name) + " ends neither in .mp4 nor in .avi");
+  const Outcome made = run(orbit + "--size 64x48 --out orbit.MP4");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(frames_of("orbit.MP4", 64, 48), 2);
+  for (const char* name : {"orbit.avi", "orbit"}) {
+    expect_failure(orbit + "--size 64x48 --out " + name, std::string(name) + " does not end in .mp4");
   }
   expect_failure(orbit + "--size 1x1 --out tiny.mp4", "1 x 1 pixels, but a clip needs 2 x 2");
   expect_failure(orbit + "--size 64x48 --out o.mp4 --json none/a.json", "none/a.json cannot be made");
-  EXPECT_EQ(files(), (std::set<std::string>{"place.maqs", "orbit.avi"}));
+  EXPECT_EQ(files(), (std::set<std::string>{"place.maqs", "orbit.MP4"}));
 }
 
 TEST_F(SceneCommandLine, WhatIsMissingOrWrongIsOneSentence) {

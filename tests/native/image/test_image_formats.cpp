@@ -102,6 +102,29 @@ TEST(ImageFormats, PngIsDecodedAsByOpenCv) {
 TEST(ImageFormats, OtherFormatsAreDecodedAsByOpenCv) {
   for (const char* extension : {".webp", ".bmp", ".tiff"})
     expect_as_opencv(encoded(extension, noise(37, 23)), extension);
+  for (const char* extension : {".bmp", ".tiff"})
+    expect_as_opencv(encoded(extension, noise(37, 23, CV_8UC1)), std::string("grey ") + extension);
+  expect_as_opencv(encoded(".tiff", noise(300, 200, CV_16UC3)), "16 bits");
+  constexpr int kNone = 1, kLzw = 5, kDeflate = 32946, kPackBits = 32773;
+  for (const int compression : {kNone, kLzw, kDeflate, kPackBits}) {
+    const std::vector<int> options = {cv::IMWRITE_TIFF_COMPRESSION, compression};
+    const std::string what = "TIFF compression " + std::to_string(compression);
+    expect_as_opencv(encoded(".tiff", smooth(301, 203), options), what);
+    expect_as_opencv(encoded(".tiff", noise(301, 203), options), what + ", noise");
+    expect_as_opencv(encoded(".tiff", cv::Mat(203, 301, CV_8UC3, cv::Scalar(7, 8, 9)), options), what + ", one colour");
+  }
+}
+
+TEST(ImageFormats, ImagesAreEncodedAsByOpenCv) {
+  for (const cv::Mat& image : {smooth(37, 23), noise(64, 48), noise(33, 17, CV_8UC1)}) {
+    const maq::ImageView view{image.channels() == 1 ? MAQ_PIXEL_GREY8 : MAQ_PIXEL_BGR8,
+                              image.cols,
+                              image.rows,
+                              {{image.data, image.step}, {}}};
+    for (const char* extension : {".png", ".jpg"}) {
+      EXPECT_EQ(maq::encode_image(view, extension), encoded(extension, image)) << extension << ' ' << image.channels();
+    }
+  }
 }
 
 TEST(ImageFormats, ImagesAreUprightByTheirExifOrientation) {

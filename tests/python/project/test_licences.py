@@ -12,7 +12,7 @@ BUILD = ROOT / "build/release"
 # Headers by their beginning, and the licence texts of the code that they bring into our files.
 HEADER_LIBRARIES = {"nlohmann/": "nlohmann-json.txt", "xxhash.h": "xxhash.txt", "CLI/": "cli11.txt"}
 # Libraries that our files link, or open, and that come with licence texts of their own.
-LINKED = ("onnxruntime", "opencv2/", "png.h", "turbojpeg.h", "libcamera/", "depthai/", "camera/Ndk", "media/Ndk")
+LINKED = ("onnxruntime", "png.h", "webp/", "vpx/", "turbojpeg.h", "libcamera/", "depthai/", "camera/Ndk", "media/Ndk")
 SYSTEM = re.compile(r"[a-z_0-9]+(\.h)?|(sys|linux|arpa|asm|android|maquette|app)/.*")
 
 

@@ -6,7 +6,7 @@
 #include "core/files/atomic_file.h"
 #include "core/files/file.h"
 #include "image/depth.h"
-#include "image/files/file_codecs.h"
+#include "image/files/image_codecs.h"
 #include "image/files/image_file.h"
 
 namespace maq {
@@ -21,7 +21,7 @@ DecodedImage decode_depth(const std::string& path) {
   const bool can_be_depth = format == ImageFormat::kPng || format == ImageFormat::kTiff;
   DecodedImage depth;
   if (can_be_depth) {
-    depth = file_codecs().decode_depth(bytes, format);
+    depth = decode_depth_image(bytes, format);
     if (depth.view.width_px == 0) {
       throw Error(MAQ_ERROR_UNREADABLE, path, " cannot be decoded: it is damaged; copy it again.");
     }
@@ -67,7 +67,7 @@ void write_depth_file(const ImageView& depth, const std::string& path) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " ends neither in .png nor in .tiff, the formats of depth images.");
   }
   AtomicFile file(path);
-  Frame stored;  // without padding, which OpenCV does not take of any size
+  Frame stored;
   if (!is_png) {
     depth_in_metres(depth, allocate_floats(stored, depth));
   } else if (depth.format == MAQ_PIXEL_DEPTH16) {
@@ -75,11 +75,7 @@ void write_depth_file(const ImageView& depth, const std::string& path) {
   } else {
     convert_to_millimetres(depth, stored);
   }
-  std::vector<uint8_t> bytes;
-  if (!file_codecs().encode_depth(is_png ? ".png" : ".tiff", stored.image, bytes)) {
-    throw Error(MAQ_ERROR_INTERNAL, "A depth image of ", depth.width_px, " x ", depth.height_px,
-                " could not be encoded as ", extension, ": there may be too little memory.");
-  }
+  const std::vector<uint8_t> bytes = encode_depth_image(is_png ? ".png" : ".tiff", stored.image);
   file.append(bytes.data(), bytes.size());
   file.commit();
 }

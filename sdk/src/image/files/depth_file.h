@@ -14,7 +14,7 @@ void read_depth_file(const std::string& path, double unit_m, Frame& frame);
 
 // By the extension of `path`: .png has whole millimetres in 16 bits, 0 where nothing is known and over 65.534 m; .tif
 // and .tiff have metres as floats. Written atomically. Throws MAQ_ERROR_INVALID_ARGUMENT for another extension,
-// MAQ_ERROR_UNWRITABLE, and the errors of file_codecs().
+// MAQ_ERROR_UNWRITABLE, and the errors of encode_depth_image().
 void write_depth_file(const ImageView& depth, const std::string& path);
 
 }  // namespace maq

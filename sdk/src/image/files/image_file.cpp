@@ -7,7 +7,7 @@
 #include "core/files/file.h"
 #include "core/files/file_reader.h"
 #include "image/convert.h"
-#include "image/files/file_codecs.h"
+#include "image/files/image_codecs.h"
 #include "image/files/jpeg.h"
 #include "image/files/origin_mark.h"
 
@@ -93,7 +93,7 @@ void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& f
   if (format == ImageFormat::kJpeg) {
     decode_jpeg(bytes, origin, frame);
   } else {
-    const DecodedImage image = file_codecs().decode_image(bytes, format);
+    const DecodedImage image = decode_stored_image(bytes, format);
     if (image.view.width_px == 0 || image.view.planes[0].data == nullptr) fail_to_decode(origin);
     check_image_size(image.view.width_px, image.view.height_px, origin);
     uint8_t* pixels = frame.allocate_bgr(image.view.width_px, image.view.height_px);
@@ -121,22 +121,9 @@ SizePx read_image_file_size(const std::string& path) {
   return {frame.image.width_px, frame.image.height_px};
 }
 
-namespace {
-
-std::vector<uint8_t> encode(const ImageView& image, const std::string& extension) {
-  std::vector<uint8_t> bytes;
-  if (!file_codecs().encode_image(extension, image, bytes)) {
-    throw Error(MAQ_ERROR_INTERNAL, "An image of ", image.width_px, " x ", image.height_px, " could not be encoded as ",
-                extension, ": there may be too little memory.");
-  }
-  return bytes;
-}
-
-}  // namespace
-
 std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension) {
   std::vector<uint8_t> memory;
-  return encode(image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory), extension);
+  return encode_stored_image(extension, image.format == MAQ_PIXEL_GREY8 ? image : as_bgr(image, memory));
 }
 
 void write_image_file(const ImageView& image, const std::string& path, const FrameOrigin& origin) {
@@ -169,7 +156,7 @@ void write_image_file(const ImageView& image, const uint8_t* alpha, const std::s
   }
   const ImageView picture{
       MAQ_PIXEL_RGBA8, image.width_px, image.height_px, {{rgba.data(), size_t(4) * size_t(image.width_px)}, {}}};
-  const std::vector<uint8_t> bytes = encode(picture, ".png");
+  const std::vector<uint8_t> bytes = encode_stored_image(".png", picture);
   file.append(bytes.data(), bytes.size());
   file.commit();
 }

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/frame.h"
-#include "image/files/file_codecs.h"
 #include "image/files/image_header.h"
 
 namespace maq {
@@ -22,7 +21,7 @@ std::vector<uint8_t> read_encoded_image(const std::string& path);
 
 // Decodes an image, a whole JPEG, PNG, WebP, BMP or TIFF file, into `frame` as BGR, with its origin. `origin` names it
 // in errors. Throws MAQ_ERROR_UNREADABLE for a file that is damaged, truncated or not an image, MAQ_ERROR_UNSUPPORTED
-// for other formats, MAQ_ERROR_IMAGE_SIZE, and, but for JPEG, the errors of file_codecs().
+// for other formats and for rare kinds of BMP and TIFF, and MAQ_ERROR_IMAGE_SIZE.
 void decode_image(const EncodedBytes& bytes, const std::string& origin, Frame& frame,
                   Orientation orientation = Orientation::kUpright);
 
@@ -34,7 +33,7 @@ void read_image_file(const std::string& path, Frame& frame, Orientation orientat
 SizePx read_image_file_size(const std::string& path);
 
 // GREY8 as one channel, all others in colour; `extension` is ".png" or ".jpg".
-// Throws MAQ_ERROR_UNSUPPORTED for a depth image, and the errors of file_codecs().
+// Throws MAQ_ERROR_UNSUPPORTED for a depth image, and the errors of encode_stored_image().
 std::vector<uint8_t> encode_image(const ImageView& image, const std::string& extension);
 
 // PNG or JPEG by the extension of `path`, written atomically. The file of a predicted frame says so (origin_mark.h).

@@ -82,6 +82,26 @@ JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& fra
   return JpegResult::kDecoded;
 }
 
+namespace {
+
+// BGR8 or GREY8.
+void compress(tjhandle encoder, const ImageView& image, int quality, int flags, std::vector<uint8_t>& bytes) {
+  const bool is_grey = image.format == MAQ_PIXEL_GREY8;
+  const int subsampling = is_grey ? TJSAMP_GRAY : TJSAMP_420;
+  bytes.resize(tjBufSize(image.width_px, image.height_px, subsampling));
+  uint8_t* target = bytes.data();
+  unsigned long size_bytes = bytes.size();
+  if (tjCompress2(encoder, image.planes[0].data, image.width_px, int(image.planes[0].stride_bytes), image.height_px,
+                  is_grey ? TJPF_GRAY : TJPF_BGR, &target, &size_bytes, subsampling, quality,
+                  flags | TJFLAG_NOREALLOC) != 0) {
+    if (says_out_of_memory(tjGetErrorStr2(encoder))) throw std::bad_alloc();
+    throw Error(MAQ_ERROR_INTERNAL, "An image could not be compressed as JPEG.");
+  }
+  bytes.resize(size_bytes);
+}
+
+}  // namespace
+
 JpegEncoder::~JpegEncoder() {
   if (encoder_ != nullptr) tjDestroy(encoder_);
 }
@@ -89,16 +109,15 @@ JpegEncoder::~JpegEncoder() {
 void JpegEncoder::encode(const ImageView& image, int quality, std::vector<uint8_t>& bytes) {
   if (encoder_ == nullptr) encoder_ = tjInitCompress();
   if (encoder_ == nullptr) throw std::bad_alloc();
-  const ImageView bgr = as_bgr(image, bgr_);
-  bytes.resize(tjBufSize(bgr.width_px, bgr.height_px, TJSAMP_420));
-  uint8_t* target = bytes.data();
-  unsigned long size_bytes = bytes.size();
-  if (tjCompress2(encoder_, bgr.planes[0].data, bgr.width_px, int(bgr.planes[0].stride_bytes), bgr.height_px, TJPF_BGR,
-                  &target, &size_bytes, TJSAMP_420, quality, TJFLAG_NOREALLOC) != 0) {
-    if (says_out_of_memory(tjGetErrorStr2(encoder_))) throw std::bad_alloc();
-    throw Error(MAQ_ERROR_INTERNAL, "A frame could not be compressed as JPEG.");
-  }
-  bytes.resize(size_bytes);
+  compress(encoder_, as_bgr(image, bgr_), quality, 0, bytes);
+}
+
+std::vector<uint8_t> encode_jpeg_photo(const ImageView& image) {
+  const std::unique_ptr<void, int (*)(tjhandle)> encoder(tjInitCompress(), &tjDestroy);
+  if (encoder == nullptr) throw std::bad_alloc();
+  std::vector<uint8_t> bytes;
+  compress(encoder.get(), image, 95, TJFLAG_ACCURATEDCT, bytes);
+  return bytes;
 }
 
 }  // namespace maq

@@ -32,6 +32,10 @@ enum class JpegResult { kDecoded, kTruncated, kDamaged };
 // bytes between segments, are ignored. Truncated images are refused; images over the limits of frame.h are damaged.
 JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& frame);
 
+// Encodes BGR8 or GREY8 at quality 95, colour at half the resolution, bit-identical to OpenCV. Throws
+// MAQ_ERROR_INTERNAL and std::bad_alloc.
+std::vector<uint8_t> encode_jpeg_photo(const ImageView& image);
+
 class JpegEncoder {
  public:
   JpegEncoder() = default;

@@ -485,7 +485,7 @@ void add_output_options(CLI::App& command, HeadOptions& options) {
       ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
   command.add_option("--save", options.save, "Also write the head itself, some 64 KB: head.maqh");
   command.add_option("--preview", options.preview, "Also write a clip of the head turning, turn.mp4, or an image")
-      ->check(CLI::Validator(check_head_view_name, ".mp4, .avi, .png or .jpg"));
+      ->check(CLI::Validator(check_head_view_name, ".mp4, .png or .jpg"));
   command.add_flag("--json", options.json, "Print the result as one JSON line per head");
 }
 

@@ -38,7 +38,7 @@ struct HeadView {
 // Returns an empty text if `path` can be the name of an image or a clip, else the reason why not.
 std::string check_head_view_name(const std::string& path);
 
-// Writes an image (.png, .jpg), or a clip (.mp4, .avi) in which the head turns once; makes its folder. Returns the text
+// Writes an image (.png, .jpg), or a clip (.mp4) in which the head turns once; makes its folder. Returns the text
 // for the user. Throws maquette::Error, or std::runtime_error after an interrupt: then an existing file stays.
 std::string write_head_view(const maquette::Context& context, const maquette::Head& head,
                             const maquette::HeadMesh& mesh, const std::string& path, const HeadView& view);

@@ -13,6 +13,7 @@
 #include "arguments/picture_size.h"
 #include "commands/head/head_commands.h"
 #include "interrupt.h"
+#include "output/frame_image.h"
 #include "output/output_file.h"
 #include "output/progress_bar.h"
 #include "print.h"
@@ -32,7 +33,7 @@ struct HeadRenderOptions {
 
 bool is_clip_name(const std::string& path) {
   const std::string ending = std::filesystem::path(path).extension().string();
-  return ending == ".mp4" || ending == ".avi";
+  return ending == ".mp4";
 }
 
 maq_pinhole_camera camera_of_view(const maquette::Head& head, const maquette::HeadRenderer& renderer,
@@ -46,16 +47,6 @@ maq_pinhole_camera camera_of_view(const maquette::Head& head, const maquette::He
                              std::to_string(view.photo) + ".");
   }
   return head.camera(uint32_t(view.photo - 1));
-}
-
-maquette::Frame frame_of_view(const maquette::Context& context, const maquette::Image& image) {
-  maq_frame_desc desc{};
-  desc.struct_size = sizeof desc;
-  desc.format = MAQ_PIXEL_BGR8;
-  desc.width_px = image.width_px(), desc.height_px = image.height_px();
-  desc.clock = MAQ_CLOCK_MEDIA;
-  desc.planes[0] = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_BGR, desc.stride_bytes));
-  return maquette::Frame(context, desc);
 }
 
 std::string write_turn(const maquette::Context& context, maquette::HeadRenderer& renderer, const std::string& path,
@@ -72,7 +63,7 @@ std::string write_turn(const maquette::Context& context, maquette::HeadRenderer&
     const auto start = std::chrono::steady_clock::now();
     const maquette::Image image = renderer.run(camera);
     rendering_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    clip.add(frame_of_view(context, image));
+    clip.add(frame_of(context, image));
     progress.advance(i + 1, "");
   }
   progress.finish();
@@ -116,7 +107,7 @@ int render_head(const HeadRenderOptions& given) {
 std::string check_head_view_name(const std::string& path) {
   const std::string ending = std::filesystem::path(path).extension().string();
   const bool is_picture = ending == ".png" || ending == ".jpg" || ending == ".jpeg";
-  return is_picture || is_clip_name(path) ? std::string() : path + " must end with .png, .jpg, .mp4 or .avi";
+  return is_picture || is_clip_name(path) ? std::string() : path + " must end with .png, .jpg or .mp4";
 }
 
 std::string write_head_view(const maquette::Context& context, const maquette::Head& head,
@@ -139,9 +130,9 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
   HeadView& view = options->view;
   CLI::App* command = head.add_subcommand("render", "Render a saved head: an image, or a clip in which it turns");
   command->add_option("head", options->head, "File that `maquette head --save` wrote")->required();
-  command->add_option("-o,--out", options->out, "Image (.png, .jpg), or clip of one turn (.mp4, .avi)")
+  command->add_option("-o,--out", options->out, "Image (.png, .jpg), or clip of one turn (.mp4)")
       ->required()
-      ->check(CLI::Validator(check_head_view_name, ".png, .jpg, .mp4 or .avi"));
+      ->check(CLI::Validator(check_head_view_name, ".png, .jpg or .mp4"));
   command
       ->add_option("--shading", options->shading, "Colours to show: colour (default), shape, normals, template, depth")
       ->check(CLI::IsMember(kShadingNames));

@@ -115,9 +115,8 @@ void print_event(double time_s, const maq_frame_desc& desc, const maq_novelty_sc
 // Returns no clip for "".
 std::optional<maquette::Clip> open_clip(const maquette::Context& context, const std::string& path, double fps) {
   if (path.empty()) return std::nullopt;
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension != ".mp4" && extension != ".avi") {
-    throw std::runtime_error(path + " is no clip; give a name that ends in .mp4 or .avi.");
+  if (std::filesystem::path(path).extension() != ".mp4") {
+    throw std::runtime_error(path + " is no clip; give a name that ends in .mp4.");
   }
   make_folder_of(path);
   return maquette::Clip(context, path, fps > 0 ? fps : 10);
@@ -196,7 +195,7 @@ void add_novelty_command(CLI::App& app, int* exit_code) {
   command->add_option("-t,--threads", options->threads, "Threads of the networks; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
   command->add_option("-o,--out", options->out,
-                      "Clip (.mp4 or .avi): each frame with novel cells in red, its reconstruction, and the curve");
+                      "Clip (.mp4): each frame with novel cells in red, its reconstruction, and the curve");
   command->add_flag("--json", options->json, "Print one JSON line a frame instead of the events");
   command->footer(
       "The score is in bits a code: about 0.03 when nothing changes, 1 to 3 when much moves, above 8 for a new scene.\n"

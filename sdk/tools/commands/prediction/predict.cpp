@@ -6,7 +6,6 @@
 #include <map>
 #include <maquette/maquette.hpp>
 #include <memory>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -45,11 +44,16 @@ constexpr double kShownBefore_s = 1;  // of seen frames at the beginning of a cl
 constexpr double kDefaultStep_s = 0.1;
 
 // Images side by side, each with its caption.
-using CaptionedImages = std::vector<std::pair<std::string, cv::Mat>>;
+using CaptionedImages = std::vector<std::pair<std::string, Canvas>>;
 
 // Returns the peak signal-to-noise ratio of 8-bit images; 99 dB for equal ones.
-double psnr_db(const cv::Mat& one, const cv::Mat& other) {
-  const double squares = cv::norm(one, other, cv::NORM_L2SQR) / (3.0 * double(one.total()));
+double psnr_db(const Canvas& one, const Canvas& other) {
+  double squares = 0;
+  for (size_t i = 0; i < one.bgr.size(); ++i) {
+    const int difference = int(one.bgr[i]) - int(other.bgr[i]);
+    squares += difference * difference;
+  }
+  squares /= double(one.bgr.size());
   return squares > 0 ? std::min(99.0, 10 * std::log10(255.0 * 255.0 / squares)) : 99;
 }
 
@@ -63,21 +67,17 @@ std::string caption(const std::string& name, double ahead_s, std::optional<doubl
   return text;
 }
 
-// Scales the images down if the row would not fit into `written`.
-cv::Mat side_by_side(const CaptionedImages& images, const PredictedImages& written) {
-  const cv::Size size = written.size_in_row(images.front().second.size(), images.size());
-  std::vector<cv::Mat> named(images.size());
-  for (size_t i = 0; i < images.size(); ++i) {
-    const auto& [name, image] = images[i];
-    if (image.size() == size) {
-      named[i] = image.clone();
-    } else {
-      cv::resize(image, named[i], size, 0, 0, cv::INTER_AREA);
-    }
-    draw_caption(name, named[i]);
+// Scales the images down if the row would not fit into a frame.
+Canvas side_by_side(const CaptionedImages& images) {
+  const PictureSide size = PredictedImages::size_in_row(images.front().second.size(), images.size());
+  Canvas row({size.width * int(images.size()), size.height});
+  int x = 0;
+  for (const auto& [name, image] : images) {
+    Canvas named = image.resized(size);
+    draw_caption(name, named);
+    row.copy(named, x, 0);
+    x += size.width;
   }
-  cv::Mat row;
-  cv::hconcat(named, row);
   return row;
 }
 
@@ -179,14 +179,14 @@ class PredictionRun {
     if (!images_.is_clip()) return;
     const size_t compared = !options_.compare ? 0 : has_own_column() ? 4 : 3;
     const size_t columns = compared + (samples_ ? size_t(samples_->count()) + 1 : 0);
-    for (const cv::Mat& image : seen_images_) {
+    for (const Canvas& image : seen_images_) {
       const CaptionedImages row(columns, {"seen", image});
-      images_.add_to_clip(has_columns() ? side_by_side(row, images_) : image);
+      images_.add_to_clip(has_columns() ? side_by_side(row) : image);
     }
   }
 
   // Returns the frame that the source shows then, if there is one of the same size; sets the time ahead to its time.
-  std::optional<cv::Mat> next_truth(PredictionRow& row) {
+  std::optional<Canvas> next_truth(PredictionRow& row) {
     if (!has_truth_) return std::nullopt;
     const std::optional<maquette::Frame> truth = source_.next();
     has_truth_ = truth && truth->desc().width_px == last_.width_px && truth->desc().height_px == last_.height_px;
@@ -198,13 +198,13 @@ class PredictionRun {
   PredictionRow predict_frame(int64_t number, double step_s) {
     PredictionRow row;
     row.ahead_s = step_s * double(number);
-    const std::optional<cv::Mat> truth = next_truth(row);
+    const std::optional<Canvas> truth = next_truth(row);
     const maquette::Frame frame = predictor_.predict(row.ahead_s);
     const maq_predictor_stats stats = predictor_.stats();
     row.method = stats.method;
     row.motion_fraction = double(stats.motion_fraction);
     row.predict_ms = double(stats.predict_ms);
-    const cv::Mat image = image_of(frame);
+    const Canvas image = image_of(frame);
     CaptionedImages columns;
     if (options_.compare) add_compared(image, truth, row, columns);
     if (samples_) add_samples(number, image, truth, row, columns);
@@ -212,15 +212,15 @@ class PredictionRun {
     return row;
   }
 
-  void add_compared(const cv::Mat& image, const std::optional<cv::Mat>& truth, PredictionRow& row,
+  void add_compared(const Canvas& image, const std::optional<Canvas>& truth, PredictionRow& row,
                     CaptionedImages& columns) {
-    const cv::Mat moved = image_of(motion_->predict(row.ahead_s)), &last = seen_images_.back();
+    const Canvas moved = image_of(motion_->predict(row.ahead_s)), &last = seen_images_.back();
     if (truth) {
       row.last_db = psnr_db(last, *truth);
       row.motion_db = psnr_db(moved, *truth);
       row.chosen_db = psnr_db(image, *truth);
     }
-    columns = {{truth ? "truth" : "no truth", truth ? *truth : cv::Mat(image.size(), image.type(), cv::Scalar())},
+    columns = {{truth ? "truth" : "no truth", truth ? *truth : Canvas(image.size())},
                {caption("last", row.ahead_s, row.last_db), last},
                {caption("motion", row.ahead_s, row.motion_db), moved}};
     if (has_own_column()) {
@@ -228,13 +228,13 @@ class PredictionRun {
     }
   }
 
-  void add_samples(int64_t number, const cv::Mat& image, const std::optional<cv::Mat>& truth, PredictionRow& row,
+  void add_samples(int64_t number, const Canvas& image, const std::optional<Canvas>& truth, PredictionRow& row,
                    CaptionedImages& columns) {
     const std::vector<float> bits = samples_->entropy_map(number);
     for (const float own : bits) row.entropy_bits += double(own) / double(bits.size());
     for (int sample = 0; sample < samples_->count(); ++sample) {
       const maquette::Frame frame = samples_->frame(sample, number);
-      cv::Mat shown = image_of(frame);
+      Canvas shown = image_of(frame);
       std::optional<double> db;
       if (truth) db = row.samples_db.emplace_back(psnr_db(shown, *truth));
       if (!options_.compare && !options_.out.empty() && !images_.is_clip()) {
@@ -248,13 +248,13 @@ class PredictionRun {
     columns.emplace_back(text, draw_entropy_map(bits, image));
   }
 
-  void write(int64_t number, const maquette::Frame& frame, cv::Mat image, const CaptionedImages& columns) {
+  void write(int64_t number, const maquette::Frame& frame, Canvas image, const CaptionedImages& columns) {
     if (options_.out.empty()) return;
     if (images_.is_clip()) {
       if (!has_columns()) draw_prediction_mark(frame, image);
-      images_.add_to_clip(has_columns() ? side_by_side(columns, images_) : image);
+      images_.add_to_clip(has_columns() ? side_by_side(columns) : image);
     } else if (options_.compare) {
-      const cv::Mat row = side_by_side(columns, images_);
+      const Canvas row = side_by_side(columns);
       images_.save(number, frame, &row);
     } else if (!samples_) {  // samples were saved one by one
       images_.save(number, frame, nullptr);
@@ -271,7 +271,7 @@ class PredictionRun {
   maquette::Predictor predictor_;
   std::optional<maquette::Predictor> motion_;  // with --compare
   std::optional<SampledFrames> samples_;       // with --samples
-  std::deque<cv::Mat> seen_images_;            // the latest, for the clip
+  std::deque<Canvas> seen_images_;             // the latest, for the clip
   maq_frame_desc first_{}, last_{};
   int64_t seen_ = 0;
   bool has_truth_ = false;
@@ -338,7 +338,7 @@ void add_predict_command(CLI::App& app, int* exit_code) {
                       "Folder of the networks; default: MAQ_PREDICTION_BUNDLE, then the installed bundle");
   command->add_option("-t,--threads", options->threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(0, 64));
-  command->add_option("-o,--out", options->out, "Clip (.mp4 or .avi), or folder for PNG files");
+  command->add_option("-o,--out", options->out, "Clip (.mp4), or folder for PNG files");
   command->add_flag("--json", options->json, "Print one JSON document");
   command->footer(
       "A clip begins with the last second before the prediction. Predicted frames have a border with their time ahead; "

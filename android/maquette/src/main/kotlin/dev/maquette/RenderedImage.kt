@@ -103,9 +103,8 @@ class RenderedImage internal constructor(pointer: Long) : AutoCloseable {
      * that exists. Blocks while the file is written.
      *
      * @param withAlpha only for PNG.
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension, alpha in a JPEG file),
-     *   [Status.UNWRITABLE] and [Status.RUNTIME_LIBRARY] (this build has no libmaquette_files.so; [toBitmap] and
-     *   Bitmap.compress need none).
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (another extension, alpha in a JPEG file)
+     *   and [Status.UNWRITABLE].
      */
     fun save(path: String, withAlpha: Boolean = false) =
         handle.use { Native.maq_image_save(it, textOf(path), if (withAlpha) MAQ_IMAGE_ALPHA_ON else MAQ_IMAGE_ALPHA_OFF) }

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/files/atomic_file.h"
 #include "core/frame.h"
-#include "image/files/file_codecs.h"
+#include "image/clips/mp4_index.h"
+#include "image/clips/vp9_encoder.h"
 
 namespace maq {
 
@@ -17,15 +18,13 @@ constexpr double kMaxClipFps = 1000;
 
 class ClipWriter {
  public:
-  // MPEG-4 in .mp4 or Motion JPEG in .avi, by the extension of `path`; `fps` from kMinClipFps to kMaxClipFps.
-  // Throws MAQ_ERROR_INVALID_ARGUMENT for another extension, and the errors of AtomicFile and file_codecs().
+  // VP9 in an MP4 file; `fps` from kMinClipFps to kMaxClipFps, rounded to 0.001.
+  // Throws MAQ_ERROR_INVALID_ARGUMENT for an extension other than .mp4, and the errors of AtomicFile.
   ClipWriter(const std::string& path, double fps);
-  ~ClipWriter();
 
   // All have the size of the first; of an odd side the last column or row is left out.
   // Throws MAQ_ERROR_INVALID_ARGUMENT for another size and after finish(), MAQ_ERROR_IMAGE_SIZE for less than 2 x 2
-  // pixels, MAQ_ERROR_UNSUPPORTED for depth images and, at the first, where this OpenCV does not write such clips, and
-  // MAQ_ERROR_UNWRITABLE, at the first, when the disk is full already.
+  // pixels, MAQ_ERROR_UNSUPPORTED for depth images and on Android, and MAQ_ERROR_UNWRITABLE when the disk is full.
   void add(const ImageView& image);
 
   // Throws MAQ_ERROR_INVALID_ARGUMENT when nothing was added, MAQ_ERROR_UNWRITABLE when the disk is full; then the
@@ -33,17 +32,16 @@ class ClipWriter {
   void finish();
 
  private:
-  void begin(const ImageView& first);
-  void end_encoding();
+  void write_chunk();
 
-  ClipFormat format_;
   double fps_;
   int width_px_ = 0, height_px_ = 0;  // size of the first image
-  uint64_t images_ = 0;
   bool is_finished_ = false;
-  std::vector<uint8_t> bgr_;
+  bool is_broken_ = false;  // an image is missing from the file
+  std::vector<uint8_t> bgr_, chunk_;
   AtomicFile file_;
-  std::unique_ptr<ClipEncoder> encoder_;  // destroyed before the file
+  std::optional<Vp9Encoder> encoder_;  // from the first image to the end
+  std::optional<Mp4Index> index_;
 };
 
 }  // namespace maq

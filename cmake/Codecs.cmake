@@ -1,0 +1,36 @@
+# maq_codecs: libjpeg-turbo (photos, frames of cameras), libpng, libwebp, zlib, and libvpx for clips.
+#
+# The libraries of the system; or, in MAQ_CODECS_DIR, static ones that become part of libmaquette.so
+# (scripts/static-codecs.sh), for packages that run on other systems.
+set(MAQ_CODECS_DIR "" CACHE PATH "Static codecs (include/ and lib/), in place of the system's")
+add_library(maq_codecs INTERFACE)
+set(_missing)
+foreach(_codec IN ITEMS "turbojpeg turbojpeg.h libturbojpeg0-dev" "png png.h libpng-dev" "webp webp/decode.h libwebp-dev"
+    "vpx vpx/vpx_encoder.h libvpx-dev" "z zlib.h zlib1g-dev")
+  separate_arguments(_codec)
+  list(GET _codec 0 _name)
+  list(GET _codec 1 _header)
+  list(GET _codec 2 _package)
+  if(MAQ_CODECS_DIR)
+    set(MAQ_${_name}_INCLUDE_DIR "${MAQ_CODECS_DIR}/include")
+    set(MAQ_${_name}_LIBRARY "${MAQ_CODECS_DIR}/lib/lib${_name}.a")
+  else()
+    find_path(MAQ_${_name}_INCLUDE_DIR ${_header})
+    find_library(MAQ_${_name}_LIBRARY ${_name})
+    mark_as_advanced(MAQ_${_name}_INCLUDE_DIR MAQ_${_name}_LIBRARY)
+  endif()
+  if(NOT MAQ_${_name}_INCLUDE_DIR OR NOT MAQ_${_name}_LIBRARY)
+    list(APPEND _missing ${_package})
+  endif()
+  target_include_directories(maq_codecs SYSTEM INTERFACE "${MAQ_${_name}_INCLUDE_DIR}")
+  target_link_libraries(maq_codecs INTERFACE "${MAQ_${_name}_LIBRARY}")
+endforeach()
+if(_missing)
+  list(JOIN _missing " " _missing)
+  message(FATAL_ERROR "Codecs were not found. On Debian install ${_missing}; elsewhere install libjpeg-turbo, libpng, "
+    "libwebp, libvpx and zlib.")
+endif()
+if(MAQ_CODECS_DIR)
+  target_link_libraries(maq_codecs INTERFACE m)
+  target_link_options(maq_codecs INTERFACE -Wl,--exclude-libs,ALL)
+endif()

@@ -74,7 +74,7 @@ mkdir -p "$codecs/include/webp" && cp src/webp/{decode,types}.h "$codecs/include
 mkdir -p "$work/vpx" && cd "$work/vpx"
 CROSS="$prefix" STRIP="${prefix}strip" NM="${prefix}nm" run $(each libvpx)configure \
     --target=$vpx_target --enable-pic --disable-vp8 --disable-vp9-decoder --disable-examples --disable-tools --disable-docs \
-    --disable-unit-tests --disable-install-bins --enable-runtime-cpu-detect --disable-webm-io --disable-libyuv \
+    --disable-unit-tests --disable-install-bins --enable-runtime-cpu-detect --disable-webm-io --disable-libyuv --enable-realtime-only --disable-postproc \
     --prefix="$codecs"
 run make -j"$jobs" libvpx.a
 cp libvpx.a "$codecs/lib/"

@@ -174,7 +174,7 @@ void PeopleView::draw_model_options() {
   };
   slider("threads", &model_.model.threads, 0, cores, model_.model.threads == 0 ? "large cores" : "%d");
   slider("key frames", &model_.key_frame_interval, 0, 30, model_.key_frame_interval <= 1 ? "every" : "one in %d");
-  slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "the model's" : "%d px");
+  slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "automatic" : "%d px");
   if (model_.long_side_px > 0) model_.long_side_px = std::max(64, model_.long_side_px);
   bool parts_alone = model_.detail == MAQ_DENSEPOSE_DETAIL_PART;
   if (ImGui::Checkbox("parts alone, no U and V", &parts_alone)) {

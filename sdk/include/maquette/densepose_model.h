@@ -13,7 +13,7 @@ extern "C" {
 typedef struct maq_densepose_model_stats {
   uint32_t struct_size;
   int32_t key_frame_interval; /* 0 before the model is loaded */
-  int32_t long_side_px;       /* 0 before the model is loaded */
+  int32_t long_side_px;       /* 0 before the model is loaded; with an automatic size, its smaller value */
 } maq_densepose_model_stats;
 
 /* Creates a model that runs dense pose. The pipeline loads the bundle later. `config` may be NULL for the defaults. It
@@ -27,8 +27,9 @@ MAQ_API maq_status maq_densepose_model_create(maq_context* context, const maq_de
 MAQ_API maq_status maq_densepose_model_set_roll(maq_model* model, float roll_rad);
 
 /* Limits the mean time that dense pose takes for a frame of a stream, for devices that throttle. `budget_ms`: up to
- * 60000; 0 (at first): no limit. If frames take longer, people are detected in every 2nd and then every 4th frame.
- * After that, long_side_px falls in steps of 32 pixels, to no less than half. When frames have taken less time for some
+ * 60000; 0 (at first): no limit. If frames take longer, people are detected in every 2nd and then every 4th frame, and
+ * an automatic size becomes its smaller value. After that, long_side_px falls in steps of 32 pixels, to no less than
+ * half. When frames have taken less time for some
  * seconds, both values return step by step.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_model_set_frame_budget(maq_model* model, double budget_ms);

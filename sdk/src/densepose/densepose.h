@@ -9,7 +9,9 @@
 #include "densepose/bundle/manifest.h"
 #include "densepose/bundle/settings.h"
 #include "densepose/crops/crop_pass.h"
+#include "densepose/detector/input_scales.h"
 #include "densepose/detector/person_detector.h"
+#include "densepose/frame_budget.h"
 #include "densepose/surface/dense_decode.h"
 #include "densepose/surface/surface_grid.h"
 #include "densepose/surface/surface_mapper.h"
@@ -78,10 +80,20 @@ class DensePose {
 
  private:
   void map_image(const ImageView& image, DensePoseResult& result);
-  // Decides whether the image is a key frame, and how the networks see it.
+  // Decides whether the image is a key frame.
   void begin_frame(const ImageView& image, DensePoseStats& stats);
-  // Maps the people in these boxes, then crops of the people who gain by one; into `mapped_`.
-  void map_people(const ImageView& image, const std::vector<ScoredBox>& found, DensePoseStats& stats);
+  // Prepares the image for the networks, at that long side.
+  void see(const ImageView& image, int long_side_px, DensePoseStats& stats);
+  // Adds the people of the image to `mapped_` and their regions to `mapper_`: of a key frame, or by propagating boxes.
+  void detect_people(const ImageView& image, DensePoseStats& stats);
+  void follow_people(const ImageView& image, DensePoseStats& stats);
+  const std::vector<ScoredBox>& run_detector(const ImageView& image, const std::vector<ScoredBox>* followed,
+                                             DensePoseStats& stats);
+  void add_people(const ImageView& image, const std::vector<ScoredBox>& found, const std::vector<uint8_t>* keeps);
+  void drop_people(const std::vector<uint8_t>& keeps);
+  void drop_beyond(size_t count);  // the lowest scores
+  // Maps the people of `mapped_`, then crops of the people who gain by one.
+  void map_people(const ImageView& image, DensePoseStats& stats);
   void drop_unlikely();
   void sort_by_score();  // `mapped_`, best first
   // Paints `mapped_`. Adds the people who got a pixel to `result`, and to `tracked_` for the next frame.
@@ -89,20 +101,26 @@ class DensePose {
 
   DensePoseSpec spec_;
   bool measures_threads_;
+  bool chooses_size_;           // among input sizes, at full quality
   DensePoseSettings settings_;  // resolved: with the bundle's values for defaults, and the threads in use
+  DensePoseQuality full_;       // as configured
+  InputScales scales_;
   std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<PersonDetector> detector_;
   std::unique_ptr<SurfaceMapper> mapper_;
   std::unique_ptr<CropPass> crops_;
   BodySurface surface_;
   std::atomic<float> roll_rad_{0};
-  RotatedInput seen_;  // of the latest image
+  int roll_steps_ = 0;
+  RotatedInput seen_;  // the latest image at its latest size
   // Scratch of a frame, kept so that the next one takes nothing from the heap.
   std::vector<MappedPerson> mapped_;
   DecodeMemory decode_memory_;
   // People of the previous frame, to be followed: by their boxes or, if all have crops, in the crops alone.
   std::vector<MappedPerson> tracked_;
   std::vector<ScoredBox> tracked_boxes_;
+  std::vector<ScoredBox> near_people_, all_people_;
+  std::vector<uint8_t> keeps_near_, keeps_far_;
   bool tracks_crops_ = false;
   int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;

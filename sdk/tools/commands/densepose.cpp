@@ -195,7 +195,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"
-      "  maquette densepose holiday/*.jpg --out results --size 480\n"
+      "  maquette densepose holiday/*.jpg --out results --crops auto\n"
       "  maquette densepose lying_phone.jpg --out results --roll 90\n"
       "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
       "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");

@@ -21,12 +21,12 @@ class CropPass : public ::testing::Test {
   std::vector<maq::MappedPerson> mapped(const maq::Box& box) {
     std::vector<float> values(3 * 320 * 256, 0.1f);
     trunk_.run(values, 320, 256, tiny_.cancel);
-    mapper_.begin(1);
+    mapper_.begin();
     mapper_.add(trunk_.features()[0], box);
     mapper_.run(tiny_.cancel);
     maq::MappedPerson person;
     person.found = {box, 0.9f, 0};
-    person.box = box;
+    person.box = person.region = box;
     person.mapper = &mapper_;
     person.answer = mapper_.answer(0);
     return {person};

@@ -102,8 +102,11 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   image(cv::Rect(160, 96, 16, 16)) = kBlue;  // cell (10, 6) of P4: a person of 128 px
   const maq::DensePoseResult result = run(image);
   ASSERT_EQ(result.people.size(), 1u);
-  const maq::PixelRect rect = maq::pixel_rect(result.people[0].box);
-  ASSERT_NEAR(rect.width, 128, 1);
+  const maq::Box box = result.people[0].box;
+  ASSERT_NEAR(box.width(), 128, 1);
+  // The dense head sees more than the box: 3 % of the width and 5 % of the height on each side.
+  const float beside = 0.03f * box.width(), above = 0.05f * box.height();
+  const maq::PixelRect rect = maq::pixel_rect({box.x0 - beside, box.y0 - above, box.x1 + beside, box.y1 + above});
   int64_t body = 0, clamped = 0;
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 320; ++x) {
@@ -181,12 +184,30 @@ TEST_F(DensePose, ABoxHiddenBehindAnotherIsDropped) {
 TEST_F(DensePose, BoxesComeBackInPixelsOfTheFrame) {
   cv::Mat image = black(640, 512);
   image(cv::Rect(160, 200, 8, 8)) = kRed;  // the cell of the first test, at twice the size
-  const maq::DensePoseResult result = run(image);
+  maq::DensePoseSettings settings;
+  settings.long_side_px = 320;
+  const maq::DensePoseResult result = run(image, settings);
   ASSERT_EQ(result.people.size(), 1u);
   EXPECT_NEAR(result.people[0].box.x0, 2 * (80 - 16 + 3.2), 1e-3);
   EXPECT_NEAR(result.people[0].box.y1, 2 * (100 + 16), 1e-3);
   EXPECT_EQ(result.stats.network_width_px, 320);
   expect_sane(result, 640, 512);
+}
+
+TEST_F(DensePose, SmallPeopleAreSoughtInALargerInputAndLargeOnesAreKept) {
+  cv::Mat image = black(640, 512);
+  EXPECT_EQ(run(image).stats.network_width_px, 480) << "nobody at the smaller size";
+  image(cv::Rect(320, 192, 32, 32)) = kBlue;  // a person of 256 px
+  const maq::DensePoseResult large = run(image);
+  ASSERT_EQ(large.people.size(), 1u);
+  EXPECT_EQ(large.stats.network_width_px, 320);
+  image(cv::Rect(80, 96, 8, 8)) = kRed;  // a person of 64 px: too small at 320
+  const maq::DensePoseResult both = run(image);
+  EXPECT_EQ(both.stats.network_width_px, 480);
+  ASSERT_GE(both.people.size(), 2u);
+  const auto is_large = [](const maq::Person& person) { return person.box.height() > 200; };
+  EXPECT_EQ(std::count_if(both.people.begin(), both.people.end(), is_large), 1);
+  expect_sane(both, 640, 512);
 }
 
 TEST_F(DensePose, WithoutPeopleTheDenseHeadDoesNotRunAndPlanesAreZero) {
@@ -268,7 +289,7 @@ TEST_F(DensePose, ACropIsTheDenseHeadsAnswerForTheBodyOfTheFirst) {
     return int(at - result.planes.part.begin()) / 320;
   };
   // The dense head leaves out the upper quarter of whatever it sees.
-  EXPECT_NEAR(top(first) - double(first.people[0].box.y0), 32, 1.5);
+  EXPECT_NEAR(top(first) - double(first.people[0].box.y0), 0.25 * 1.1 * 128 - 0.05 * 128, 1.5);
   EXPECT_NEAR(top(again) - top(first), 24, 1.5);
   expect_sane(again, 320, 256);
 }

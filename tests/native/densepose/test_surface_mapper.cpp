@@ -31,7 +31,7 @@ class SurfaceMapper : public ::testing::Test {
 TEST_F(SurfaceMapper, AnswersFollowEachOtherAndDoNotDependOnOtherPeople) {
   const maq::Box box{8, 8, 40, 40};
   const maq::FeatureMap dark = features(0), bright = features(1);
-  mapper_.begin(2);
+  mapper_.begin();
   mapper_.add(dark, box);
   mapper_.add(bright, box);
   mapper_.run(tiny_.cancel);
@@ -39,14 +39,14 @@ TEST_F(SurfaceMapper, AnswersFollowEachOtherAndDoNotDependOnOtherPeople) {
   EXPECT_EQ(mapper_.answer(1).labels - mapper_.answer(0).labels, std::ptrdiff_t(mapper_.labels_size()));
   EXPECT_EQ(mapper_.answer(1).surface - mapper_.answer(0).surface, std::ptrdiff_t(mapper_.surface_size()));
   EXPECT_EQ(first.size(), second.size());
-  mapper_.begin(1);
+  mapper_.begin();
   mapper_.add(bright, box);
   mapper_.run(tiny_.cancel);
   EXPECT_EQ(answer(0), second);
 }
 
 TEST_F(SurfaceMapper, LogitsDescribeTheAnswerAlsoOfACopy) {
-  mapper_.begin(1);
+  mapper_.begin();
   mapper_.add(features(0.5f), {0, 0, 48, 48});
   mapper_.run(tiny_.cancel);
   const maq::SurfaceAnswer answer = mapper_.answer(0);

@@ -137,7 +137,8 @@ maq_status maq_densepose_model_create(maq_context* context, const maq_densepose_
     require_argument(context, "context");
     require_argument(model, "model");
     const maq_densepose_config config = read_densepose_config(given, "config");
-    const DensePoseSettings settings = densepose_settings(config, "config");
+    DensePoseSettings settings = densepose_settings(config, "config");
+    settings.is_stream = true;
     *model = new maq_model(std::make_shared<DensePoseModel>(
         context->state, bundle_reader(config.model, "config.model", kDensePoseBundle), settings));
     return MAQ_OK;

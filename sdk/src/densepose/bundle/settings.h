@@ -9,8 +9,8 @@ enum class PersonCrops { kOff, kAuto, kAll };  // see maq_densepose_crops
 
 // See maq_densepose_config. 0 (a negative threshold): the bundle's value.
 struct DensePoseSettings {
-  int threads = 1;  // or MAQ_THREADS_MEASURED
-  int long_side_px = 0;
+  int threads = 1;       // or MAQ_THREADS_MEASURED
+  int long_side_px = 0;  // 0: by the people in the image, from the bundle's value up
   float score_threshold = -1;
   int max_people = 0;
   int max_proposals = 0;
@@ -21,6 +21,7 @@ struct DensePoseSettings {
   bool surface = true;
   bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
+  bool is_stream = false;  // images follow one another, so that the input's size may depend on earlier ones
 };
 
 }  // namespace maq

@@ -10,6 +10,8 @@ namespace {
 // People gain by a crop whose box has a shorter long side, in pixels of the network's input, or who lean by more.
 constexpr float kSmallPersonPx = 150;
 constexpr double kMinLeanDegrees = 15;
+// The first answer may cut people off: the region of a crop is wider on each side by this fraction of its long side.
+constexpr double kCropMargin = 0.03;
 // Crops follow people who move by less than this fraction of their long side from frame to frame.
 constexpr double kMotionMargin = 0.05;
 // The answer of a crop may be less confident than the first one by this mean probability of the part. Measured on
@@ -66,11 +68,11 @@ void CropPass::choose(std::vector<MappedPerson>& people, const Point& up) {
     const DenseLogits logits = person.logits();
     classify_cells(logits, memory_);
     person.confidence = part_confidence(logits, threshold, memory_);
-    const AffineMap cells =
-        person.first_view ? person.first_view->to_cells(logits.size).inverse() : map_of_cells(person.box, logits.size);
+    const AffineMap cells = person.first_view ? person.first_view->to_cells(logits.size).inverse()
+                                              : map_of_cells(person.region, logits.size);
     const auto axis = find_body_axis(logits, cells, threshold, memory_);
-    const PersonCrop crop =
-        crop_around_person(logits.size, cells, axis.value_or(up), threshold, 0, settings_.crop_side_px, memory_);
+    const PersonCrop crop = crop_around_person(logits.size, cells, axis.value_or(up), threshold, kCropMargin,
+                                               settings_.crop_side_px, memory_);
     const bool is_small = std::max(person.found.box.width(), person.found.box.height()) < kSmallPersonPx;
     if (settings_.crops == PersonCrops::kAll || leans(axis, kMinLeanDegrees, up) || is_small) person.crop = crop;
   }
@@ -85,7 +87,7 @@ int CropPass::run(const ImageView& image, std::vector<MappedPerson>& people, Run
   const size_t labels_size = mapper_.labels_size(), surface_size = mapper_.surface_size();
   first_answers_.resize(people.size() * (labels_size + surface_size));
   float* copy = first_answers_.data();
-  mapper_.begin(count);
+  mapper_.begin();
   const int side = settings_.crop_side_px;
   for (MappedPerson& person : people) {
     if (person.answer.labels != nullptr) {

@@ -19,7 +19,9 @@ namespace maq {
 // A person with the answer of a dense head.
 struct MappedPerson {
   ScoredBox found;                       // in pixels of the network's input
+  float to_seen = 1;                     // pixels of the frame's last input in a pixel of the person's input
   Box box;                               // in pixels of the image
+  Box region;                            // in pixels of the image: seen by the dense head, wider than `box`
   Box beyond_body;                       // from the bounds of the painted body to `box`, of the latest key frame
   std::optional<PersonCrop> first_view;  // the region of the first answer, in an image that was rotated
   std::optional<PersonCrop> crop;

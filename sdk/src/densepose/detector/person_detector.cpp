@@ -47,12 +47,12 @@ const std::vector<ScoredBox>& PersonDetector::run(const ImageView& image, const 
   } else {
     make_network_input(image, seen.size, spec_.input, input_);
   }
-  stats.preprocess_ms = float(stage.lap_ms());
+  stats.preprocess_ms += float(stage.lap_ms());
 
   trace.next("maquette detector");
   const std::vector<float>& values = is_rotated ? rotated_.values : input_.values;
   stats.provider = trunk_.run(values, padded.width_px, padded.height_px, cancel);
-  stats.trunk_ms = float(stage.lap_ms());
+  stats.trunk_ms += float(stage.lap_ms());
 
   trace.next("maquette boxes");
   if (followed == nullptr) {
@@ -60,8 +60,8 @@ const std::vector<ScoredBox>& PersonDetector::run(const ImageView& image, const 
   } else {
     proposals_ = *followed;
   }
-  stats.proposals = int(proposals_.size());
-  stats.proposals_ms = float(stage.lap_ms());
+  stats.proposals += int(proposals_.size());
+  stats.proposals_ms += float(stage.lap_ms());
 
   // Followed boxes went through the box head in the previous frame, so that this is their second pass.
   if (followed == nullptr && spec_.box_head.second_pass_threshold) {
@@ -70,7 +70,7 @@ const std::vector<ScoredBox>& PersonDetector::run(const ImageView& image, const 
     proposals_.swap(found_);
   }
   run_box_head(proposals_, seen, min_score, cancel, found_, &stats.dropped_boxes);
-  stats.box_head_ms = float(stage.lap_ms());
+  stats.box_head_ms += float(stage.lap_ms());
   return found_;
 }
 

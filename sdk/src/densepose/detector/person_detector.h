@@ -30,8 +30,8 @@ class PersonDetector {
   PersonDetector(const DensePoseNetworks& networks, const DensePoseSpec& spec, const DensePoseSettings& settings);
 
   // Finds people in the image as `seen` shows it, with scores above `min_score`, best first, in pixels of the network's
-  // input. `followed`: boxes of the previous frame, which take the place of proposals; nullptr: they are searched. The
-  // result is valid until the next run. Throws MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
+  // input. `followed`: boxes of the previous frame, which take the place of proposals; nullptr: they are searched. Adds
+  // to `stats`. The result is valid until the next run. Throws MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
   const std::vector<ScoredBox>& run(const ImageView& image, const RotatedInput& seen,
                                     const std::vector<ScoredBox>* followed, float min_score, RunCancel& cancel,
                                     DetectorStats& stats);

@@ -10,7 +10,7 @@ namespace maq {
 namespace {
 
 constexpr char kPersonLogits[] = "person";  // output of the trunk
-constexpr size_t kSizedTrunks = 2;          // kept: of frames and of crops
+constexpr size_t kSizedTrunks = 3;          // kept: of frames at two sizes, and of crops
 
 GraphSpec trunk_graph(const Manifest& manifest, const DensePoseSpec& spec) {
   std::vector<std::string> maps = at_levels("p", Trunk::kFirstLevel, Trunk::kFirstLevel + int(Trunk::kAllLevels) - 1);

@@ -1,5 +1,7 @@
 #include "densepose/surface/surface_mapper.h"
 
+#include <algorithm>
+
 namespace maq {
 
 SurfaceMapper::SurfaceMapper(const DensePoseNetworks& networks, const DensePoseSpec& spec, const std::string& name,
@@ -16,14 +18,19 @@ SurfaceMapper::SurfaceMapper(const DensePoseNetworks& networks, const DensePoseS
                               networks.on_provider());
 }
 
-void SurfaceMapper::begin(size_t count) {
-  count_ = count;
-  added_ = 0;
-  rois_.resize(count * roi_size());
+void SurfaceMapper::add(const FeatureMap& features, const Box& box) {
+  rois_.resize((count_ + 1) * roi_size());
+  roi_align_.run(features, box, spec_.pool_size, rois_.data() + count_++ * roi_size());
 }
 
-void SurfaceMapper::add(const FeatureMap& features, const Box& box) {
-  roi_align_.run(features, box, spec_.pool_size, rois_.data() + added_++ * roi_size());
+void SurfaceMapper::drop(const std::vector<uint8_t>& keeps) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    if (keeps[i] == 0) continue;
+    if (kept != i) std::copy_n(rois_.data() + i * roi_size(), roi_size(), rois_.data() + kept * roi_size());
+    ++kept;
+  }
+  count_ = kept;
 }
 
 void SurfaceMapper::run(RunCancel& cancel) {

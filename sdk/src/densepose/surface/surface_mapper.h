@@ -1,6 +1,7 @@
 // Maps people to the body surface: the dense head over their regions of the trunk's features.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -26,10 +27,12 @@ class SurfaceMapper {
   SurfaceMapper(const DensePoseNetworks& networks, const DensePoseSpec& spec, const std::string& name,
                 const std::string& charts_file, int channels, int surface_channels = 0);
 
-  // Begins a run over `count` people.
-  void begin(size_t count);
+  // Begins a run.
+  void begin() { count_ = 0; }
   // Adds a person: the region `box` of the features, in pixels of the trunk's input.
   void add(const FeatureMap& features, const Box& box);
+  // Takes back the people whose entry in `keeps` is 0; the others keep their order.
+  void drop(const std::vector<uint8_t>& keeps);
   // Runs the dense head over all people. Answers, in the order of add(), are valid until the next run of the mapper.
   void run(RunCancel& cancel);
   SurfaceAnswer answer(size_t index) const;
@@ -50,7 +53,7 @@ class SurfaceMapper {
   std::unique_ptr<Session> dense_head_;
   RoiAlign roi_align_;
   std::vector<float> rois_;
-  size_t count_ = 0, added_ = 0;
+  size_t count_ = 0;
   const float *labels_ = nullptr, *surface_ = nullptr;
   std::vector<TensorView> inputs_;
   std::vector<Shape> shapes_;

@@ -49,6 +49,8 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      *
      * @property threads 0: the large cores, at most 4; [THREADS_MEASURED]: as many of these as pay, measured while the
      *   networks are made, which takes up to about half a second longer. [DensePoseResult.Stats.threads] tells.
+     * @property longSidePx the long side of the networks' input. 0: automatic: the bundle's value, and 480 pixels as
+     *   well where people are small or nobody is found.
      * @property scoreThreshold minimum score of a person.
      * @property resultPoolSize results that the app may hold at once, 1 to 64; 0: 4.
      * @property keyFrameInterval 0 and 1: people are detected in each frame; N: in every N-th frame of a stream.

@@ -74,7 +74,9 @@ class DensePoseSettings(ModelSettings, total=False):
     """Fields of maq_densepose_config."""
 
     long_side_px: int
-    """Images are scaled to this long side, 32 to 2048; 0 (default): the bundle's value."""
+    """Images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's value finds near people. If
+    it shows small people or nobody, larger images are also searched at 480 pixels. In a stream each key frame decides
+    for the next one."""
 
     score_threshold: float
     """Minimum score of a person, up to 1; 0 (default): the bundle's value."""

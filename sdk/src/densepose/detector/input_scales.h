@@ -23,7 +23,8 @@ class InputScales {
   bool runs_near() const { return !is_far_ || checks_near_; }
   // After the smaller input: whether the larger one runs as well. `people` are in its pixels.
   bool runs_far(const std::vector<ScoredBox>& people);
-  // After a key frame that ran the larger input; counts for streams only. `people`: all of the frame, in pixels of the smaller one.
+  // After a key frame that ran the larger input; counts for streams only. `people`: everybody in the frame, in pixels
+  // of the smaller input.
   void judge(const std::vector<ScoredBox>& people, bool ran_near);
   // The next image begins another stream.
   void reset();

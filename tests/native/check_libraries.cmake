@@ -1,6 +1,6 @@
-# Fails when LIBRARY needs other shared libraries than the C and C++ runtimes and what decodes JPEG, for
+# Fails when LIBRARY needs other shared libraries than the C and C++ runtimes and codecs (cmake/Codecs.cmake), for
 # `cmake -DREADELF=… -DLIBRARY=… -P`.
-set(allowed "^(libc|libm|libdl|librt|libpthread|libgcc_s|libstdc\\+\\+|libturbojpeg|ld-linux[-a-z0-9_]*)\\.so(\\.[0-9]+)*$")
+set(allowed "^(libc|libm|libdl|librt|libpthread|libgcc_s|libstdc\\+\\+|libturbojpeg|libpng16|libwebp|libvpx|libz|ld-linux[-a-z0-9_]*)\\.so(\\.[0-9]+)*$")
 execute_process(COMMAND "${READELF}" -d "${LIBRARY}" OUTPUT_VARIABLE sections RESULT_VARIABLE result)
 if(result)
   message(FATAL_ERROR "${READELF} -d ${LIBRARY} failed (${result}).")

@@ -71,6 +71,25 @@ TEST_F(ApiArguments, ARecorderSaysWhatIsWrong) {
   expect_error(maq_recorder_create(context_, "/tmp", nullptr, nullptr, &recorder), MAQ_ERROR_UNWRITABLE, context_,
                "/tmp cannot be made");
   EXPECT_EQ(recorder, nullptr);
+  maq_source* source = nullptr;
+  ASSERT_EQ(maq_source_create(context_, "stub:pattern", nullptr, &source), MAQ_OK);
+  maq_source_destroy(source);
+  for (const void* wrong : {static_cast<const void*>(source), static_cast<const void*>(context_)}) {
+    expect_error(
+        maq_recorder_create(context_, "/tmp/no.maqrec", static_cast<const maq_source*>(wrong), nullptr, &recorder),
+        MAQ_ERROR_INVALID_ARGUMENT, context_, "source ");
+  }
+}
+
+TEST_F(ApiArguments, OnlyTheSizeOfTheStructIsAccepted) {
+  maq_pipeline_config config;
+  ASSERT_EQ(maq_pipeline_config_init(&config, sizeof config), MAQ_OK);
+  maq_pipeline* pipeline = nullptr;
+  for (uint32_t size = 0; size < 2 * sizeof config; ++size) {  // among them sizes that end amid a pointer
+    if (size == sizeof config) continue;
+    config.struct_size = size;
+    EXPECT_EQ(maq_pipeline_create(context_, &config, &pipeline), MAQ_ERROR_INVALID_ARGUMENT) << size;
+  }
 }
 
 TEST_F(ApiArguments, FilesOfABundleThatAreNoneAreRefused) {

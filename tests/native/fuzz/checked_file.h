@@ -1,7 +1,6 @@
 // Inputs whose start says their true length and checksum: otherwise nothing behind the checksum is ever read.
 #pragma once
 
-#define XXH_INLINE_ALL
 #include <xxhash.h>
 
 #include "core/files/checked_bytes.h"

@@ -19,7 +19,7 @@ constexpr int64_t kMaxPixels = 1 << 18;  // larger images only take longer
 
 bool is_small(const fuzz::Bytes& bytes) {
   const auto size = read_image_size(bytes);
-  return !size || size->width * size->height <= kMaxPixels;
+  return !size || (size->width <= kMaxPixels && size->height <= kMaxPixels && size->width * size->height <= kMaxPixels);
 }
 
 // Reads every pixel.

@@ -88,10 +88,10 @@ FUZZ(surface) {
   DensePlanes planes;
   planes.reset(numbers.within(1, 64), numbers.within(1, 64));
   Box box{numbers.take<float>(), numbers.take<float>(), numbers.take<float>(), numbers.take<float>()};
-  AffineMap to_cells;
-  for (double* value : {&to_cells.xx, &to_cells.xy, &to_cells.shift_x, &to_cells.yx, &to_cells.yy, &to_cells.shift_y}) {
-    *value = double(numbers.take<int32_t>()) / 65536;
-  }
+  // A rotation and a scaling, as crops of people have.
+  const double angle_rad = double(numbers.take<int16_t>()) / 1000, scale = double(numbers.within(1, 10000)) / 100;
+  AffineMap to_cells{scale * std::cos(angle_rad), -scale * std::sin(angle_rad), double(numbers.take<int32_t>()) / 256,
+                     scale * std::sin(angle_rad), scale * std::cos(angle_rad),  double(numbers.take<int32_t>()) / 256};
   const std::vector<float> labels =
       numbers.floats(size_t(logits.size) * size_t(logits.size) * size_t(logits.coarse_classes + logits.index_classes));
   logits.labels = labels.data();

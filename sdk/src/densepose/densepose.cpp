@@ -16,7 +16,7 @@ constexpr int kCropSidePx = 192;
 constexpr double kFullCircle_rad = 2 * 3.14159265358979323846;
 // Crops follow people who keep this fraction of their pixels.
 constexpr double kMinKeptBody = 0.25;
-// Of a box's width and height, on each side.
+// Fractions of a box's width and height, on each side.
 constexpr float kSideMargin = 0.03f, kEndMargin = 0.05f;
 
 // Puts the bundle's values in place of zeros.

@@ -38,7 +38,7 @@ class Setting:
         return self.options.get("key_frame_interval", 1)
 
 
-def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 320, 384)) -> list[Setting]:
+def settings(long_sides: tuple[int, ...] = (160, 192, 224, 256, 288, 320, 384)) -> list[Setting]:
     """Returns the measured settings. The first is the shipped bundle with default options."""
     made = [Setting("as shipped", "shipped"), Setting("fp32", "precision", "fp32")]
     made += [Setting(f"{side} px", "input size", options={"long_side_px": side}) for side in long_sides]

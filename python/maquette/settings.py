@@ -75,8 +75,8 @@ class DensePoseSettings(ModelSettings, total=False):
 
     long_side_px: int
     """Images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's value finds near people. If
-    it shows small people or nobody, larger images are also searched at 480 pixels. In a stream each key frame decides
-    for the next one."""
+    it shows small people or nobody, larger images are also searched at 480 pixels. In a stream (frames with a
+    `sequence` above 0), earlier frames count, too."""
 
     score_threshold: float
     """Minimum score of a person, up to 1; 0 (default): the bundle's value."""

@@ -32,7 +32,8 @@ typedef struct maq_densepose_config {
   maq_model_options model;    /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */
   int32_t long_side_px;       /* images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's
                                  value finds near people. If it shows small people or nobody, larger images are also
-                                 searched at 480 pixels. In a stream each key frame decides for the next one. */
+                                 searched at 480 pixels. In a stream (frames with a `sequence` above 0), earlier
+                                 frames count, too. */
   float score_threshold;      /* minimum score of a person, up to 1; 0 (default): the bundle's value */
   int32_t max_people;         /* 1 to 255, best scores first; 0 (default): the bundle's value */
   int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes

@@ -55,7 +55,7 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       chooses_size_(settings.long_side_px == 0),
       settings_(resolved(settings, spec_)),
       full_{settings_.key_frame_interval, settings_.long_side_px},
-      scales_(settings_.long_side_px, settings_.is_stream || settings_.key_frame_interval > 1),
+      scales_(settings_.long_side_px),
       cancel_(std::make_unique<RunCancel>(runtime)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
                bundle.path_of(spec_.surface_file)) {
@@ -76,7 +76,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   }
 }
 
-void DensePose::run(const ImageView& image, DensePoseResult& result) {
+void DensePose::run(const ImageView& image, DensePoseResult& result, bool follows) {
+  scales_.set_stream(follows || settings_.key_frame_interval > 1);
   try {
     map_image(image, result);
     cancel_->check();  // a later cancel() is for the next run

@@ -55,9 +55,10 @@ class DensePose {
   DensePose& operator=(const DensePose&) = delete;
 
   // Reuses the memory of `result`. One thread at a time. With key_frame_interval above 1, images are frames of one
-  // stream: between key frames the boxes of the previous frame replace proposals. Throws MAQ_ERROR_INFERENCE,
+  // stream: between key frames the boxes of the previous frame replace proposals. `follows`: the image is the next
+  // frame of a stream, so that an automatic size may depend on earlier frames. Throws MAQ_ERROR_INFERENCE,
   // MAQ_CANCELLED.
-  void run(const ImageView& image, DensePoseResult& result);
+  void run(const ImageView& image, DensePoseResult& result, bool follows = false);
   // From any thread: ends the current run, or the next one if none runs.
   void cancel() noexcept { cancel_->cancel(); }
   // The next image begins another stream.

@@ -21,20 +21,20 @@ std::vector<ScoredBox> people_of(std::initializer_list<float> heights_px) {
 }
 
 TEST(InputScales, ASmallImageIsNeverEnlarged) {
-  const InputScales scales(kNearPx, false);
+  const InputScales scales(kNearPx);
   EXPECT_EQ(scales.far_side_px(320, 0), 0);
   EXPECT_EQ(scales.far_side_px(400, 0), 400);
   EXPECT_EQ(scales.far_side_px(4000, 0), 480);
 }
 
 TEST(InputScales, PeopleWhomTheAppDoesNotAskForNeedNoLargerInput) {
-  const InputScales scales(kNearPx, false);
+  const InputScales scales(kNearPx);
   EXPECT_EQ(scales.far_side_px(1280, 600), 0);
   EXPECT_EQ(scales.far_side_px(1280, 300), 480);
 }
 
 TEST(InputScales, AStillImageGetsTheLargerInputForSmallPeopleAndForNobody) {
-  InputScales scales(kNearPx, false);
+  InputScales scales(kNearPx);
   for (int repeat = 0; repeat < 3; ++repeat) {
     EXPECT_TRUE(scales.runs_near());
     EXPECT_FALSE(scales.runs_far(people_of({250, 180})));
@@ -46,7 +46,8 @@ TEST(InputScales, AStillImageGetsTheLargerInputForSmallPeopleAndForNobody) {
 }
 
 TEST(InputScales, AStreamStaysAtTheLargerInputWhilePeopleAreSmall) {
-  InputScales scales(kNearPx, true);
+  InputScales scales(kNearPx);
+  scales.set_stream(true);
   ASSERT_TRUE(scales.runs_near());
   ASSERT_TRUE(scales.runs_far(people_of({60})));
   scales.judge(people_of({60, 50}), true);
@@ -61,7 +62,8 @@ TEST(InputScales, AStreamStaysAtTheLargerInputWhilePeopleAreSmall) {
 }
 
 TEST(InputScales, AStreamLeavesTheLargerInputOnceNobodyIsSmall) {
-  InputScales scales(kNearPx, true);
+  InputScales scales(kNearPx);
+  scales.set_stream(true);
   scales.runs_far(people_of({60}));
   scales.judge(people_of({60}), true);
   scales.judge(people_of({120}), false);
@@ -75,14 +77,16 @@ TEST(InputScales, AStreamLeavesTheLargerInputOnceNobodyIsSmall) {
 }
 
 TEST(InputScales, LargePeopleBesideSmallOnesAreLookedForAtTheSmallerInput) {
-  InputScales scales(kNearPx, true);
+  InputScales scales(kNearPx);
+  scales.set_stream(true);
   scales.runs_far(people_of({60, 250}));
   scales.judge(people_of({60, 250}), true);
   EXPECT_TRUE(scales.runs_near());
 }
 
 TEST(InputScales, AnEmptyStreamIsSearchedAtTheLargerInputNowAndThen) {
-  InputScales scales(kNearPx, true);
+  InputScales scales(kNearPx);
+  scales.set_stream(true);
   int far = 0;
   for (int frame = 0; frame < 32; ++frame) {
     ASSERT_TRUE(scales.runs_near());
@@ -94,7 +98,8 @@ TEST(InputScales, AnEmptyStreamIsSearchedAtTheLargerInputNowAndThen) {
 }
 
 TEST(InputScales, OneManAtADeskCostsTheSmallerInputOnly) {
-  InputScales scales(kNearPx, true);
+  InputScales scales(kNearPx);
+  scales.set_stream(true);
   for (int frame = 0; frame < 32; ++frame) {
     ASSERT_TRUE(scales.runs_near());
     ASSERT_FALSE(scales.runs_far(people_of({200})));

@@ -115,7 +115,8 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(frame, "frame");
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
-    densepose->densepose->run(frame->frame.image, handle->result);
+    const bool is_stream = frame->frame.sequence > 0;
+    densepose->densepose->run(frame->frame.image, handle->result, is_stream);
     *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });

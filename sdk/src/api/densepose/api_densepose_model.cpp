@@ -51,7 +51,7 @@ class DensePoseModel : public LiveModel {
   void run(const Frame& frame, const maq_intrinsics*, std::unique_ptr<LiveOutput>& output) override {
     const auto begin = MonotonicClock::now();
     densepose_->set_roll(roll_rad_);
-    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result);
+    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result, true);
     keep_budget(begin);
   }
 
@@ -137,8 +137,7 @@ maq_status maq_densepose_model_create(maq_context* context, const maq_densepose_
     require_argument(context, "context");
     require_argument(model, "model");
     const maq_densepose_config config = read_densepose_config(given, "config");
-    DensePoseSettings settings = densepose_settings(config, "config");
-    settings.is_stream = true;
+    const DensePoseSettings settings = densepose_settings(config, "config");
     *model = new maq_model(std::make_shared<DensePoseModel>(
         context->state, bundle_reader(config.model, "config.model", kDensePoseBundle), settings));
     return MAQ_OK;

@@ -21,7 +21,6 @@ struct DensePoseSettings {
   bool surface = true;
   bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
-  bool is_stream = false;  // images follow one another, so that the input's size may depend on earlier ones
 };
 
 }  // namespace maq

@@ -13,7 +13,13 @@ namespace maq {
 class InputScales {
  public:
   // `near_side_px`: long side of the smaller input.
-  InputScales(int near_side_px, bool is_stream) : near_side_px_(near_side_px), is_stream_(is_stream) {}
+  explicit InputScales(int near_side_px) : near_side_px_(near_side_px) {}
+
+  // Whether the next image is a frame of a stream; at first it is a still image.
+  void set_stream(bool is_stream) {
+    if (!is_stream) reset();
+    is_stream_ = is_stream;
+  }
 
   // Returns the long side of the larger input. Returns 0 if the image has too few pixels for it, or if no person of
   // `min_person_px` pixels in the image is small in the smaller input.
@@ -31,7 +37,7 @@ class InputScales {
 
  private:
   int near_side_px_;
-  bool is_stream_;
+  bool is_stream_ = false;
   bool is_far_ = false;       // the stream stays at the larger input
   bool checks_near_ = false;  // the next key frame runs both
   int empty_frames_ = 0;      // in a row, at the smaller input

@@ -27,10 +27,11 @@ demo: build  ## dense pose on a bundled photo and clip, what the clip shows next
 build: packages-demo  ## configure and build the SDK and its command line (release)
 	@JOBS=$(JOBS) scripts/build.sh release $(if $(wildcard build/release/CMakeCache.txt),,-DMAQ_BUILD_TESTS=OFF)
 
+WHEELS ?= $(shell uname -m)
 .PHONY: wheel
-wheel: build  ## the Python package with library and networks inside, into build/wheel
+wheel: packages-wheel  ## Python packages for Linux with glibc 2.28 and newer: library, and networks of each system, into build/wheel
 	@scripts/make-venv.sh
-	@scripts/make-wheel.sh
+	@JOBS=$(JOBS) scripts/make-wheel.sh $(WHEELS)
 
 .PHONY: desktop-demo
 desktop-demo: packages-desktop build  ## the webcam demo with a window: builds it and starts it
@@ -116,6 +117,12 @@ site:  ## guides and API reference as web pages, into build/site, and a check of
 	@.venv/bin/python scripts/site/build.py
 	@.venv/bin/python -m pytest tests/site
 
+.PHONY: test-wheel
+test-wheel:  ## the wheels of `make wheel` in bare Debian 11, 12 and 13, beside the release build; needs root; not part of `test-all`
+	@scripts/install-packages.sh newcomer
+	@scripts/make-venv.sh
+	@$(PYTHON) -m tests.wheel
+
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench
@@ -145,8 +152,8 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-test-all
-packages-demo packages-desktop packages-test packages-lint packages-fuzz: packages-%:
+.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-test-all
+packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel: packages-%:
 	@scripts/install-packages.sh $*
 
 packages-test-all:  # a group whose packages cannot be installed prints why it is not run

@@ -1,12 +1,12 @@
 """Puts into the wheel what pyproject.toml cannot say: the installed SDK, and the C API's declarations for cffi.
 
-MAQ_INSTALLED: the folder that `cmake --install` wrote (`make wheel` sets it).
+MAQ_INSTALLED: the folder that `cmake --install` wrote. MAQ_CODECS: static codecs, for their licences. MAQ_SAMPLES:
+files to try things with. MAQ_PLATFORM: the wheel's platform. `make wheel` sets all of them.
 """
 
 import os
 import platform
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -27,23 +27,27 @@ class BuildWithLibrary(build_py):
             sys.exit(f"{library} is not there. Run `make wheel`, or set MAQ_INSTALLED to what `cmake --install` wrote.")
         target = Path(self.build_lib) / "maquette"
         write_module(installed / "include/maquette", target / "_generated.py")
-        (target / "lib").mkdir(exist_ok=True)
-        shutil.copyfile(library, target / "lib/libmaquette.so")
+        for folder in ("bin", "lib", "share/maquette/licenses", "share/maquette/samples"):
+            (target / folder).mkdir(parents=True, exist_ok=True)
+        program = installed / "bin/maquette"
+        # By the name under which the command line looks for it.
+        shutil.copyfile(library, target / "lib" / ".".join(library.resolve().name.split(".")[:4]))
         shutil.copytree(installed / "lib/maquette", target / "lib/maquette", dirs_exist_ok=True)
-        for share in ("models", "licenses", "stub"):
+        shutil.copy(program, target / "bin/maquette")
+        for share in ("licenses", "stub"):
             place = f"share/maquette/{share}"
             shutil.copytree(installed / place, target / place, dirs_exist_ok=True)
-        for needed in _jpeg_libraries(library):
-            shutil.copyfile(needed, target / "lib" / needed.name)
-            licence = target / "share/maquette/licenses/libjpeg-turbo.txt"
-            shutil.copyfile("/usr/share/doc/libturbojpeg0/copyright", licence)
+        for name in os.environ.get("MAQ_SAMPLES", "").split():
+            shutil.copy(name, target / "share/maquette/samples")
+        self._copy_licences(target / "share/maquette/licenses")
 
-
-def _jpeg_libraries(library: Path) -> list[Path]:
-    """libjpeg-turbo, which few machines without a desktop have."""
-    listed = subprocess.run(["ldd", str(library)], capture_output=True, text=True, check=True).stdout
-    found = (line.split(" => ")[1].split(" (")[0] for line in listed.splitlines() if "libturbojpeg.so" in line)
-    return [Path(path) for path in found]
+    def _copy_licences(self, target: Path) -> None:
+        """Of what only wheels have inside."""
+        codecs = os.environ.get("MAQ_CODECS")
+        if codecs:
+            shutil.copyfile("/usr/share/doc/libstdc++6/copyright", target / "libstdc++.txt")
+            for licence in Path(codecs).glob("licenses/*.txt"):
+                shutil.copyfile(licence, target / licence.name)
 
 
 class NativeDistribution(Distribution):
@@ -53,9 +57,13 @@ class NativeDistribution(Distribution):
 
 class NativeWheel(bdist_wheel):
     def get_tag(self) -> tuple[str, str, str]:
-        """For any Python 3, and for systems with the C library of this one or a newer one."""
+        """For any Python 3, and for the systems that MAQ_PLATFORM says, else those as new as this one."""
         _, version = platform.libc_ver()
-        return "py3", "none", f"manylinux_{version.replace('.', '_')}_{platform.machine()}"
+        return (
+            "py3",
+            "none",
+            os.environ.get("MAQ_PLATFORM") or f"manylinux_{version.replace('.', '_')}_{platform.machine()}",
+        )
 
 
 setup(

@@ -9,6 +9,7 @@
 #   scripts/install-packages.sh lint        + clang-format and clang-tidy
 #   scripts/install-packages.sh fuzz        + Clang with libFuzzer (test, too)
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
+#   scripts/install-packages.sh wheel       to build the SDK, and: what builds codecs from source
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
 #   scripts/install-packages.sh site        to build the site: Doxygen, Maven
@@ -100,6 +101,12 @@ if wants camera-vm; then
     needs_command v4l2-ctl v4l-utils
     needs_command cam libcamera-tools
     needs_command udevadm udev
+fi
+if wants wheel; then
+    needs_command dpkg-source dpkg-dev
+    needs_command nasm nasm
+    needs_command autoreconf autoconf
+    needs_command libtoolize libtool
 fi
 if wants lint; then
     needs_command clang-format clang-format

@@ -25,7 +25,7 @@ from maquette.heads import (
     MorphTarget,
 )
 from maquette.images import Image
-from maquette.native import MaquetteError, library_path, native
+from maquette.native import MaquetteError, library_path, native, sample
 from maquette.pipeline import (
     DensePoseModel,
     EdgesModel,
@@ -56,7 +56,7 @@ __all__ = [
     "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",
     "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "Recorder", "Scene",
     "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
-    "list_source_schemes", "part_colours", "part_name",
+    "list_source_schemes", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from maquette.native import library_path
+from maquette.native import library_path, name_ffmpeg
 
 
 def program() -> Path | None:
@@ -25,6 +25,7 @@ def main() -> int:
             f"maquette: the command line is not beside {library_path()}. Build the SDK (make build).", file=sys.stderr
         )
         return 1
+    name_ffmpeg()
     arguments = [str(found), *sys.argv[1:]]
     if os.name == "nt":
         return subprocess.run(arguments, check=False).returncode

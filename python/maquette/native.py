@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
+import contextlib
 import functools
+import importlib.util
 import os
 import time
 import weakref
@@ -23,7 +24,7 @@ T = TypeVar("T")
 _WAIT_NS = 50_000_000  # Ctrl-C ends a wait within this time
 
 _FOLDER = Path(__file__).resolve().parent
-_IN_WHEEL = _FOLDER / "lib" / "libmaquette.so"
+_IN_WHEEL = next(_FOLDER.glob("lib/libmaquette.so*"), None)
 _CHECKOUT = _FOLDER.parent.parent
 _IN_CHECKOUT = _CHECKOUT / "build/release/stage/lib/libmaquette.so"
 
@@ -45,7 +46,29 @@ def library_path() -> Path:
     given = os.environ.get("MAQ_LIBRARY")
     if given:
         return Path(given).resolve()
-    return _IN_WHEEL if _IN_WHEEL.exists() else _IN_CHECKOUT
+    return _IN_WHEEL or _IN_CHECKOUT
+
+
+def sample(name: str) -> Path:
+    """A file to try things with: "photo.jpg", a person; "box_depth.png", depth in millimetres of a camera whose focal
+    length is 600 pixels."""
+    places = (_FOLDER / "share/maquette/samples", _CHECKOUT / "tests/media")
+    found = next((place / name for place in places if (place / name).is_file()), None)
+    if found is None:
+        raise MaquetteError(
+            f"There is no sample {name!r}; there are photo.jpg and box_depth.png.", "MAQ_ERROR_NOT_FOUND"
+        )
+    return found
+
+
+def name_ffmpeg() -> None:
+    """Lets the library read clips by the ffmpeg of the extra `clips`, unless MAQ_FFMPEG names another."""
+    if "MAQ_FFMPEG" in os.environ or importlib.util.find_spec("imageio_ffmpeg") is None:
+        return
+    import imageio_ffmpeg  # type: ignore[import-not-found,import-untyped]
+
+    with contextlib.suppress(RuntimeError):  # installed without its program
+        os.environ["MAQ_FFMPEG"] = imageio_ffmpeg.get_ffmpeg_exe()
 
 
 class Native:
@@ -59,8 +82,7 @@ class Native:
             from maquette._generated import ffi  # type: ignore[import-not-found]
         except ImportError:
             ffi = read_headers(_CHECKOUT / "sdk/include/maquette")
-        for other in sorted(path.parent.glob("libturbojpeg.so*")):  # the wheel brings its own; found by its name then
-            ctypes.CDLL(str(other), mode=ctypes.RTLD_GLOBAL)
+        name_ffmpeg()
         # C does not keep a struct's texts alive: they live as long as the struct.
         self._texts: weakref.WeakKeyDictionary[Any, list[Any]] = weakref.WeakKeyDictionary()
         self.ffi: Any = ffi

@@ -16,7 +16,7 @@ VERSION = re.search(r'^version = "([^"]+)"', (ROOT / "python/pyproject.toml").re
 
 
 def write_wheel(bundle: Path, licence: Path, folder: Path) -> Path:
-    """Of a bundle's folder, such as densepose-b-int8. The same files give the same bytes."""
+    """`bundle`: a folder such as densepose-b-int8. The same files give the same bytes."""
     system = bundle.name.split("-")[0]
     info = f"maquette_models_{system}-{VERSION}.dist-info"
     files = {

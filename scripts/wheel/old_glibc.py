@@ -3,9 +3,9 @@
     python3 scripts/wheel/old_glibc.py FOLDER [--prefix aarch64-linux-gnu-] [--version 2.28]
 
 A newer glibc keeps every old version of its functions. The libraries here name, for each function, the newest of its
-versions that is old enough. A program that is linked against them runs on that glibc and all newer ones. `compat.c`, which
-becomes part of it, has the few functions that came later. The folder gets libc.so, libm.so, others that old systems need,
-and compat.o and start.o.
+versions that is old enough. A program that is linked against them runs on that glibc and all newer ones. `compat.c`,
+which becomes part of it, has the few functions that came later. The folder gets libc.so, libm.so, others that old
+systems need, and compat.o and start.o.
 """
 
 import argparse
@@ -16,7 +16,12 @@ from pathlib import Path
 HERE = Path(__file__).parent
 # Each library by the name of its file, and its name at run time. Functions of libpthread and libdl moved to libc in 2.34;
 # before, nothing else loads these two.
-LIBRARIES = {"libc.so": "libc.so.6", "libm.so": "libm.so.6", "libpthread.so": "libpthread.so.0", "libdl.so": "libdl.so.2"}
+LIBRARIES = {
+    "libc.so": "libc.so.6",
+    "libm.so": "libm.so.6",
+    "libpthread.so": "libpthread.so.0",
+    "libdl.so": "libdl.so.2",
+}
 LOADER = {"x86_64": "ld-linux-x86-64.so.2", "aarch64": "ld-linux-aarch64.so.1"}  # libld.so
 SYMBOL = re.compile(r"\d+: +[0-9a-f]+ +(\d+) +(\w+) +(GLOBAL|WEAK) +DEFAULT +(\w+) +(\S+?)@@?GLIBC_([\d.]+)$", re.M)
 
@@ -48,8 +53,8 @@ def link(folder: Path, compiler: str, file: str, symbols: dict[str, tuple[str, s
     source, script = folder / f"{file}.s", folder / f"{file}.map"
     source.write_text("\n".join([*lines, '.section .note.GNU-stack,"",%progbits', ""]))
     script.write_text("".join(f"GLIBC_{version} {{ }};\n" for version in versions) or "{ local: *; };\n")
-    subprocess.run([compiler, "-shared", "-nostdlib", f"-Wl,-soname,{LIBRARIES[file]}", f"-Wl,--version-script={script}",
-                    "-o", folder / file, source], check=True)  # fmt: skip
+    command = [compiler, "-shared", "-nostdlib", f"-Wl,-soname,{LIBRARIES[file]}", f"-Wl,--version-script={script}"]
+    subprocess.run([*command, "-o", folder / file, source], check=True)
     source.unlink()
     script.unlink()
 
@@ -62,7 +67,9 @@ def main() -> None:
     arguments = parser.parse_args()
     compiler = f"{arguments.prefix}gcc"
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    machine = subprocess.run([compiler, "-dumpmachine"], check=True, capture_output=True, text=True).stdout.split("-")[0]
+    machine = subprocess.run([compiler, "-dumpmachine"], check=True, capture_output=True, text=True).stdout.split("-")[
+        0
+    ]
     LIBRARIES["libld.so"] = LOADER[machine]
     for file, soname in LIBRARIES.items():
         ask = [compiler, f"-print-file-name={soname}"]

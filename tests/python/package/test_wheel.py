@@ -41,19 +41,22 @@ def wheel(tmp_path_factory) -> Path:
                "--no-build-isolation", "--wheel-dir", folder, folder / "source"]  # fmt: skip
     subprocess.run(command, check=True, env={**os.environ, "MAQ_INSTALLED": str(installed)})
     (built,) = folder.glob("*.whl")
+    command = [sys.executable, ROOT / "scripts/wheel/model_wheels.py", installed / "share/maquette", folder]
+    subprocess.run(command, check=True)
     return built
 
 
 def test_the_wheel_runs_without_the_checkout(wheel, tmp_path):
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(tmp_path)
+    for part in wheel.parent.glob("*.whl"):
+        with zipfile.ZipFile(part) as archive:
+            archive.extractall(tmp_path)
     environment = {k: v for k, v in os.environ.items() if not k.startswith("MAQ_")} | {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run(
         [sys.executable, "-P", "-c", SCRIPT], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
 
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == [str(tmp_path / "maquette/lib/libmaquette.so"), "1", "True", "1", "True"]
+    assert done.stdout.split() == [str(tmp_path / "maquette/lib/libmaquette.so.0.3"), "1", "True", "1", "True"]
 
 
 def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
@@ -63,17 +66,16 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
         metadata = archive.read("maquette-0.3.0.dist-info/METADATA").decode()
     assert "Requires-Dist: cffi" in metadata
     assert "maquette.DensePose" in metadata  # the README
-    for name in ("py.typed", "share/maquette/licenses/LICENSE", "share/maquette/licenses/libjpeg-turbo.txt",
+    for name in ("py.typed", "share/maquette/licenses/LICENSE", "bin/maquette",
                  "share/maquette/licenses/onnxruntime/LICENSE.txt",
-                 "share/maquette/models/edges-int8/manifest.json",
-                 "share/maquette/models/heads-int8/manifest.json",
-                 "share/maquette/models/prediction-int8/manifest.json"):  # fmt: skip
+                 ):  # fmt: skip
         assert f"maquette/{name}" in names
     assert not [name for name in names if "demo" in name or name.startswith("build")]
-    # 17 MB until edges had a network of twice the size (0.4 MB) and the library prediction (0.07 MB); then the bundle
-    # of prediction came (2.4 MB, of which its table packs well), its transformer (3 MB) and larger networks of edges
-    # and heads (0.7 MB); 23.5 MB until the refiner came (1.4 MB).
-    assert wheel.stat().st_size < 24.5e6
+    assert not [name for name in names if "/models/" in name]
+    models = {path.name.split("-")[0]: path for path in wheel.parent.glob("maquette_models_*")}
+    assert len(models) == 5
+    # Library, command line, ONNX Runtime (8.4 MB) and the networks of dense pose (2 MB).
+    assert wheel.stat().st_size + models["maquette_models_densepose"].stat().st_size < 14e6
 
 
 def test_the_wheel_is_not_built_without_the_library(tmp_path):

@@ -1,0 +1,17 @@
+"""The first program of a user: first_minute.py MEDIA OUT."""
+
+import sys
+from pathlib import Path
+
+import maquette
+
+media, out = map(Path, sys.argv[1:])
+photo = maquette.Source(f"image:{media / 'photo.jpg'}").read()
+result = maquette.DensePose().run(photo)
+assert len(result.people) == 1, result.people
+photo.save(str(out / "saved.png"))
+clip = maquette.ClipWriter(str(out / "saved.mp4"), fps=10)
+for _, frame in zip(range(5), maquette.Source(f"video:{media / 'clip.mp4'}")):
+    clip.add(frame)
+clip.finish()
+assert maquette.sample("photo.jpg").read_bytes() == (media / "photo.jpg").read_bytes()

@@ -23,7 +23,9 @@ LIBRARIES = {
     "libdl.so": "libdl.so.2",
 }
 LOADER = {"x86_64": "ld-linux-x86-64.so.2", "aarch64": "ld-linux-aarch64.so.1"}  # libld.so
-SYMBOL = re.compile(r"\d+: +[0-9a-f]+ +(\d+) +(\w+) +(GLOBAL|WEAK) +DEFAULT +(\w+) +(\S+?)@@?GLIBC_([\d.]+)$", re.M)
+SYMBOL = re.compile(  # size, type, section, name, version
+    r"\d+: +[0-9a-f]+ +(\d+) +(\w+) +(?:GLOBAL|WEAK) +DEFAULT +(\w+) +(\S+?)@@?GLIBC_([\d.]+)$", re.MULTILINE
+)
 
 
 def numbers(version: str) -> tuple[int, ...]:
@@ -34,7 +36,7 @@ def old_symbols(library: str, limit: tuple[int, ...]) -> dict[str, tuple[str, st
     """For each name: version, type and size of its newest old symbol."""
     listed = subprocess.run(["readelf", "--dyn-syms", "-W", library], check=True, capture_output=True, text=True).stdout
     found: dict[str, tuple[str, str, int]] = {}
-    for size, kind, _, section, name, version in SYMBOL.findall(listed):
+    for size, kind, section, name, version in SYMBOL.findall(listed):
         if section == "UND" or kind == "TLS" or numbers(version) > limit:
             continue
         if name not in found or numbers(version) > numbers(found[name][0]):

@@ -84,7 +84,8 @@ def made_files(release: str, work: Path) -> float:
     for script in ("first_minute.sh", "first_minute.py"):
         shutil.copy(HERE / script, work)
     (system / "test").mkdir(exist_ok=True)
-    enter = f'mount --bind "{work}" "{system}/test" && mount -t proc proc "{system}/proc" && exec chroot "{system}" sh -c "$1"'
+    mounts = f'mount --bind "{work}" "{system}/test" && mount -t proc proc "{system}/proc"'
+    enter = f'{mounts} && exec chroot "{system}" sh -c "$1"'
     begin = time.monotonic()
     run("unshare", "--mount", "--net", "--pid", "--fork", "sh", "-c", enter, "sh", INSTALL,
         env={"HOME": "/root", "PATH": "/usr/sbin:/usr/bin:/sbin:/bin"})  # fmt: skip
@@ -106,8 +107,8 @@ def main() -> int:
         names = sorted(path.name for path in expected.iterdir())
         assert names == sorted(path.name for path in (work / "out").iterdir())
         other = [name for name in names if (expected / name).read_bytes() != (work / "out" / name).read_bytes()]
-        print(f"{'FAILED' if other else 'ok'}  {release}: {seconds:.0f} s; {len(names) - len(other)} of {len(names)} files "
-              f"equal the release build's {other[:8] or ''}", flush=True)  # fmt: skip
+        equal = f"{len(names) - len(other)} of {len(names)} files equal the release build's"
+        print(f"{'FAILED' if other else 'ok'}  {release}: {seconds:.0f} s; {equal} {other[:8] or ''}", flush=True)
         failed += bool(other)
     return 1 if failed else 0
 

@@ -1,5 +1,6 @@
 """The first program of a user: first_minute.py MEDIA OUT."""
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ result = maquette.DensePose().run(photo)
 assert len(result.people) == 1, result.people
 photo.save(str(out / "saved.png"))
 clip = maquette.ClipWriter(str(out / "saved.mp4"), fps=10)
-for _, frame in zip(range(5), maquette.Source(f"video:{media / 'clip.mp4'}")):
+for frame in itertools.islice(maquette.Source(f"video:{media / 'clip.mp4'}"), 5):
     clip.add(frame)
 clip.finish()
 assert maquette.sample("photo.jpg").read_bytes() == (media / "photo.jpg").read_bytes()

@@ -42,7 +42,7 @@ class BuildWithLibrary(build_py):
         self._copy_licences(target / "share/maquette/licenses")
 
     def _copy_licences(self, target: Path) -> None:
-        """Of what only wheels have inside."""
+        """Adds the licences of libraries that only wheels have inside."""
         codecs = os.environ.get("MAQ_CODECS")
         if codecs:
             shutil.copyfile("/usr/share/doc/libstdc++6/copyright", target / "libstdc++.txt")

@@ -14,8 +14,8 @@ import subprocess
 from pathlib import Path
 
 HERE = Path(__file__).parent
-# Each library by the name of its file, and its name at run time. Functions of libpthread and libdl moved to libc in 2.34;
-# before, nothing else loads these two.
+# Each library by the name of its file, and its name at run time. Functions of libpthread and libdl moved to libc in
+# 2.34; before, nothing else loads these two.
 LIBRARIES = {
     "libc.so": "libc.so.6",
     "libm.so": "libm.so.6",

@@ -113,20 +113,20 @@ def test_a_recording_keeps_frames_and_seeks(tmp_path):
 
 def test_a_clip_is_written_and_an_unfinished_one_is_not(tmp_path):
     images = [np.full((48, 64, 3), value, np.uint8) for value in (40, 200)]
-    with maquette.ClipWriter(tmp_path / "clip.avi", fps=10) as clip:
+    with maquette.ClipWriter(tmp_path / "clip.mp4", fps=10) as clip:
         for image in images:
             clip.add(image)
-    read = [np.asarray(frame) for frame in maquette.Source(tmp_path / "clip.avi")]
+    read = [np.asarray(frame) for frame in maquette.Source(tmp_path / "clip.mp4")]
     assert np.abs(np.array(read, int) - np.array(images)).max() < 8
 
     def fails() -> None:
-        with maquette.ClipWriter(tmp_path / "other.avi", fps=10) as clip:
+        with maquette.ClipWriter(tmp_path / "other.mp4", fps=10) as clip:
             clip.add(images[0])
             clip.add(np.zeros((10, 10, 3), np.uint8))
 
     with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_INVALID_ARGUMENT"):
         fails()
-    assert [path.name for path in tmp_path.iterdir()] == ["clip.avi"]
+    assert [path.name for path in tmp_path.iterdir()] == ["clip.mp4"]
 
 
 def test_a_live_source_has_a_descriptor_and_stops():

@@ -96,7 +96,7 @@ test-newcomer:  ## the commands of README.md in a bare Debian, from top to botto
 	@$(PYTHON) -m tests.newcomer
 
 .PHONY: release
-release: wheel android  ## all packages with checksums, signature and SBOM, into build/dist (docs/reference/packages.md)
+release: build wheel android  ## all packages with checksums, signature and SBOM, into build/dist (docs/reference/packages.md)
 	@scripts/install-packages.sh release
 	@scripts/release/build.sh
 

@@ -4,7 +4,7 @@
 #   scripts/release/build.sh
 #
 #   *.whl                        Python packages                        (build/wheel)
-#   maquette-VERSION-*.tar.gz    library, headers, programs, networks   (build/release)
+#   maquette-VERSION-*.tar.gz    library, headers, programs, networks   (build/wheel-MACHINE)
 #   maquette-models-*.tar.gz     the networks of each system
 #   *.deb                        Debian packages                        (deb.sh)
 #   maven/                       Maven repository with the AAR          (build/android)
@@ -20,24 +20,29 @@ version="$(sed -n 's/^project(maquette VERSION \([0-9.]*\).*/\1/p' CMakeLists.tx
 epoch="$(git log -1 --format=%ct)"
 dist="$PWD/build/dist"
 work="$PWD/build/dist-work"
-built="$(build/release/stage/bin/maquette info | sed -n 's/.*(commit \(.*\))/\1/p')"
 commit="$(git rev-parse --short=12 HEAD)"
-[ "$built" = "$commit" ] || {
-    echo "build/release is of commit $built ('+': with changes), but HEAD is $commit. Commit changes, run cmake --preset release" \
-        "and make release again." >&2
-    exit 1
-}
+for build in build/release "build/wheel-$(uname -m)"; do
+    built="$("$build/stage/bin/maquette" info | sed -n 's/.*(commit \(.*\))/\1/p')"
+    [ "$built" = "$commit" ] || {
+        echo "$build is of commit $built ('+': with changes), but HEAD is $commit. Commit changes, run cmake -B $build" \
+            "and make release again." >&2
+        exit 1
+    }
+done
 rm -rf "$dist" "$work"
 mkdir -p "$dist" "$work"
 python="${PYTHON:-python3}"
 
-# pack NAME COMPONENT...: a tarball of installed components with their SBOM; the same content gives the same bytes.
+# pack NAME MACHINE COMPONENT...: a tarball of installed components with their SBOM; the same content gives the same bytes.
 pack() {
-    local name=$1 component
-    for component in "${@:2}"; do
-        cmake --install build/release --prefix "$work/$name" --component "$component" >/dev/null
-    done
+    local name=$1 machine=$2 component
     mkdir -p "$work/$name/share/maquette/licenses"
+    for component in "${@:3}"; do
+        cmake --install "build/wheel-$machine" --prefix "$work/$name" --component "$component" >/dev/null
+        # The library contains codecs and the C++ runtime.
+        [ "$component" != runtime ] || cp ".deps/codecs-$machine/licenses"/*.txt "$work/$name/share/maquette/licenses/"
+        [ "$component" != runtime ] || cp /usr/share/doc/libstdc++6/copyright "$work/$name/share/maquette/licenses/libstdc++.txt"
+    done
     cp LICENSE "$work/$name/share/maquette/licenses/"
     "$python" scripts/release/sbom.py --name "${name%-"$version"*}" --root "$work/$name" \
         --out "$work/$name/share/maquette/sbom/${name%-"$version"*}.cdx.json"
@@ -45,8 +50,11 @@ pack() {
         --mode=u+w,go=rX "$name" | gzip -n -9 >"$dist/$name.tar.gz"
 }
 systems=(densepose scenes edges heads prediction)
-pack "maquette-$version-linux-$(uname -m)" runtime development tools "${systems[@]/#/models-}"
-for system in "${systems[@]}"; do pack "maquette-models-$system-$version" "models-$system"; done
+for build in build/wheel-*/; do
+    machine="$(basename "${build#build/wheel-}")"
+    pack "maquette-$version-linux-$machine" "$machine" runtime development tools "${systems[@]/#/models-}"
+done
+for system in "${systems[@]}"; do pack "maquette-models-$system-$version" "$(uname -m)" "models-$system"; done
 
 scripts/release/deb.sh "$dist"
 

@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -25,14 +26,14 @@ ROOT = Path(__file__).parents[2]
 DIST = Path(os.environ.get("MAQ_RELEASE", ROOT / "build/dist"))
 KEY = Path(os.environ.get("MAQ_MINISIGN_PUBLIC_KEY", Path(__file__).with_name("TEST-ONLY.pub")))
 VERSION = re.search(r"project\(maquette VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+MACHINE = platform.machine()
+SYSTEMS = ("densepose", "scenes", "edges", "heads", "prediction")
 KINDS = {
-    f"maquette-{VERSION}-py3-none-*.whl",
-    f"maquette-{VERSION}-linux-*.tar.gz",
-    *(
-        f"maquette-models-{system}-{VERSION}.tar.gz"
-        for system in ("densepose", "scenes", "edges", "heads", "prediction")
-    ),
+    f"maquette-{VERSION}-py3-none-manylinux_2_28_{MACHINE}.whl",
+    f"maquette-{VERSION}-linux-{MACHINE}.tar.gz",
+    *(f"maquette-models-{system}-{VERSION}.tar.gz" for system in SYSTEMS),
     *(f"{name}_{VERSION}_*.deb" for name in (f"libmaquette{VERSION.rsplit('.', 1)[0]}", "libmaquette-dev", "maquette")),
+    *(f"maquette_models_{system}-{VERSION}-py3-none-any.whl" for system in SYSTEMS),
     f"maquette-models_{VERSION}_all.deb",
     f"maven/dev/maquette/maquette/{VERSION}/maquette-{VERSION}.aar",
     f"maven/dev/maquette/maquette/{VERSION}/maquette-{VERSION}.pom",
@@ -128,7 +129,7 @@ def test_the_debian_packages_are_clean():
 
 
 def test_the_program_of_the_tarball_finds_people_in_a_photo(tmp_path):
-    (tarball,) = DIST.glob(f"maquette-{VERSION}-linux-*.tar.gz")
+    (tarball,) = DIST.glob(f"maquette-{VERSION}-linux-{MACHINE}.tar.gz")
     folder = unpack(tarball, tmp_path)
     photo = ROOT / "tests/media/photo.jpg"
     command = [folder / "bin/maquette", "densepose", photo, "--out", tmp_path / "results"]

@@ -58,8 +58,9 @@ def sbom(name: str, hashes: dict[str, str]) -> dict:
     for file in hashes:
         if file.endswith("/manifest.json"):
             bundle = Path(file).parent.name
+            manifest = json.loads((ROOT / "sdk/models" / bundle / "manifest.json").read_text())
             parts.append({"type": "machine-learning-model", "bom-ref": f"model:{bundle}", "name": bundle,
-                          "version": version(), "licenses": licences("Apache-2.0")})  # fmt: skip
+                          "version": manifest["version"], "licenses": licences("Apache-2.0")})  # fmt: skip
     files = [
         {"type": "file", "bom-ref": f"file:{file}", "name": file, "hashes": [{"alg": "SHA-256", "content": digest}]}
         for file, digest in hashes.items()

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -26,6 +27,7 @@ namespace {
 constexpr char kFormats[] =
     "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,ivf,h264,hevc,m4v,mjpeg,nut,yuv4mpegpipe,dv,mxf,rm";
 constexpr size_t kTextBytes = 16 << 10;
+constexpr rlim_t kProgramBytes = rlim_t(1) << 30;  // more than it takes
 
 [[noreturn]] void fail_to_start(const std::string& path, const char* program, int reason) {
   if (reason == ENOMEM) throw std::bad_alloc();
@@ -131,10 +133,10 @@ void ClipReader::require_memory_of_program() {
   const int status = process_.wait();
   const off_t end = ::lseek(messages_.get(), 0, SEEK_END);
   const std::string text = text_at(messages_.get(), std::max<off_t>(end - off_t(kTextBytes), 0));
-  constexpr char kLoaderWords[] = "failed to map segment";
-  const bool is_limited = address_space_left() != SIZE_MAX,
-             has_result = WIFEXITED(status) && WEXITSTATUS(status) != 127;
-  if (says_out_of_memory(text) || text.find(kLoaderWords) != std::string::npos || (is_limited && !has_result)) {
+  // Under a limit of memory its words say many things.
+  rlimit limit{};
+  const bool is_limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur < kProgramBytes;
+  if (says_out_of_memory(text) || (is_limited && (!WIFEXITED(status) || WEXITSTATUS(status) != 0))) {
     throw std::bad_alloc();
   }
 }

@@ -17,10 +17,10 @@ namespace {
 // More than an uncompressed image of MAQ_MAX_PIXELS, at 16 bits and four channels.
 constexpr uint64_t kMaxImageBytes = uint64_t(1) << 30;
 
-constexpr char kFormats[] = "JPEG, PNG, WebP, BMP or TIFF";
+constexpr char kReadFormats[] = "JPEG, PNG, WebP, BMP or TIFF";
 
 [[noreturn]] void fail_to_decode(const std::string& origin) {
-  throw Error(MAQ_ERROR_UNREADABLE, origin, " cannot be decoded: it is damaged or no image; use a whole ", kFormats,
+  throw Error(MAQ_ERROR_UNREADABLE, origin, " cannot be decoded: it is damaged or no image; use a whole ", kReadFormats,
               " file.");
 }
 
@@ -31,7 +31,7 @@ ImageFormat format_of(const EncodedBytes& start, const std::string& origin) {
     throw Error(MAQ_ERROR_UNSUPPORTED, origin, " is ", name, ", no image; open the file as a source, as video:.");
   }
   if (format == ImageFormat::kNotRead) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, origin, " is ", name, ", which is not read; save it as ", kFormats, ".");
+    throw Error(MAQ_ERROR_UNSUPPORTED, origin, " is ", name, ", which is not read; save it as ", kReadFormats, ".");
   }
   return format;
 }

@@ -35,8 +35,8 @@ void read_bytes(png_structp png, png_bytep to, size_t count) {
 }
 void ignore(png_structp, png_const_charp) {}
 
-struct Reader {
-  explicit Reader(Input& input) {
+struct PngReader {
+  explicit PngReader(Input& input) {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &is_memory, fail, ignore);
     info = png == nullptr ? nullptr : png_create_info_struct(png);
     if (info == nullptr) {
@@ -46,9 +46,9 @@ struct Reader {
     png_set_read_fn(png, &input, read_bytes);
     png_set_user_limits(png, MAQ_MAX_SIDE_PX, MAQ_MAX_SIDE_PX);
   }
-  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
-  Reader(const Reader&) = delete;
-  Reader& operator=(const Reader&) = delete;
+  ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
 
   // The result for a failed call.
   DecodedImage failure() const {
@@ -63,7 +63,7 @@ struct Reader {
 
 // libpng leaves these by longjmp(), so that nothing in them has a destructor.
 
-bool read_head(const Reader& reader) {
+bool read_head(const PngReader& reader) {
   png_structp png = reader.png;
   if (setjmp(png_jmpbuf(png))) return false;
   png_read_info(png, reader.info);
@@ -82,7 +82,7 @@ bool read_head(const Reader& reader) {
 }
 
 // Grey of 16 bits stays as it is; of other pixels the head is read and no more.
-bool read_depth_head(const Reader& reader) {
+bool read_depth_head(const PngReader& reader) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_info(reader.png, reader.info);
   png_set_swap(reader.png);  // PNG has the high byte first
@@ -91,12 +91,12 @@ bool read_depth_head(const Reader& reader) {
   return true;
 }
 
-bool is_grey_of_16_bits(const Reader& reader) {
+bool is_grey_of_16_bits(const PngReader& reader) {
   return png_get_color_type(reader.png, reader.info) == PNG_COLOR_TYPE_GRAY &&
          png_get_bit_depth(reader.png, reader.info) == 16;
 }
 
-bool read_pixels(const Reader& reader, png_bytepp rows) {
+bool read_pixels(const PngReader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
   png_read_end(reader.png, nullptr);
@@ -104,7 +104,7 @@ bool read_pixels(const Reader& reader, png_bytepp rows) {
 }
 
 // For a reader that has read the head.
-DecodedImage decode(const Reader& reader, maq_pixel_format format, size_t pixel_bytes) {
+DecodedImage decode(const PngReader& reader, maq_pixel_format format, size_t pixel_bytes) {
   const size_t width = png_get_image_width(reader.png, reader.info);
   const size_t height = png_get_image_height(reader.png, reader.info);
   const size_t row = width * pixel_bytes;
@@ -172,14 +172,14 @@ bool write_image(const Writer& writer, const ImageView& image, int colours) {
 
 DecodedImage decode_png(const EncodedBytes& bytes) {
   Input input{bytes.data, bytes.size};
-  const Reader reader(input);
+  const PngReader reader(input);
   if (!read_head(reader)) return reader.failure();
   return decode(reader, MAQ_PIXEL_BGR8, 3);
 }
 
 DecodedImage decode_depth_png(const EncodedBytes& bytes) {
   Input input{bytes.data, bytes.size};
-  const Reader reader(input);
+  const PngReader reader(input);
   if (!read_depth_head(reader)) return reader.failure();
   if (is_grey_of_16_bits(reader)) return decode(reader, MAQ_PIXEL_DEPTH16, 2);
   return {{MAQ_PIXEL_DEPTH16,

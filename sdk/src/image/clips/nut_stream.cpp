@@ -51,7 +51,8 @@ class NutStream::Packet {
     return (value & 1) != 0 ? -int64_t(value >> 1) : int64_t(value >> 1);
   }
   std::vector<uint8_t> text() {
-    const size_t size = size_t(std::min<uint64_t>(number(), bytes_.size() - at_));
+    const uint64_t asked = number();
+    const size_t size = size_t(std::min<uint64_t>(asked, bytes_.size() - at_));
     const auto begin = bytes_.begin() + ptrdiff_t(at_);
     at_ += size;
     return {begin, begin + ptrdiff_t(size)};
@@ -228,8 +229,8 @@ int64_t NutStream::pts_of(uint64_t coded) const {
   const uint64_t period = uint64_t(1) << pts_bits_;
   if (coded >= period) return int64_t(coded - period);
   // The low bits of the time next to the last.
-  const int64_t mask = int64_t(period) - 1, near = last_pts_ - mask / 2;
-  return ((int64_t(coded) - near) & mask) + near;
+  const uint64_t mask = period - 1, near = uint64_t(last_pts_) - mask / 2;
+  return int64_t(((coded - near) & mask) + near);
 }
 
 bool NutStream::read(std::vector<uint8_t>& pixels, int64_t& time_ns) {
@@ -245,7 +246,7 @@ bool NutStream::read(std::vector<uint8_t>& pixels, int64_t& time_ns) {
   if ((code.flags & kInvalid) != 0) return false;
   if ((code.flags & kCoded) != 0) code.flags ^= number();
   if ((code.flags & kStreamId) != 0) code.stream = number();
-  last_pts_ = (code.flags & kCodedPts) != 0 ? pts_of(number()) : last_pts_ + code.pts_step;
+  last_pts_ = (code.flags & kCodedPts) != 0 ? pts_of(number()) : int64_t(uint64_t(last_pts_) + uint64_t(code.pts_step));
   uint64_t size = code.size_offset;
   if ((code.flags & kSizeMsb) != 0) size += code.size_factor * number();
   if ((code.flags & kMatchTime) != 0) number();

@@ -156,9 +156,9 @@ void decode_lzw(const uint8_t* in, size_t size, std::vector<uint8_t>& out) {
 }
 
 // The pixels as the directory describes them, and their decoding.
-class Reader {
+class TiffReader {
  public:
-  explicit Reader(const EncodedBytes& bytes) : bytes_(bytes), directory_(bytes) {
+  explicit TiffReader(const EncodedBytes& bytes) : bytes_(bytes), directory_(bytes) {
     width = directory_.value(kWidth, 0);
     height = directory_.value(kHeight, 0);
     if (width < 1 || height < 1 || width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX) throw Damage();
@@ -258,7 +258,7 @@ class Reader {
   const Directory directory_;
 };
 
-DecodedImage read_colours(const Reader& reader) {
+DecodedImage read_colours(const TiffReader& reader) {
   if (reader.bits != 8 && reader.bits != 16) refuse("bits a sample", reader.bits);
   if (reader.format != kUnsigned) refuse("sample format", reader.format);
   if (reader.photometric > kIndexed) refuse("photometric interpretation", reader.photometric);
@@ -290,7 +290,7 @@ DecodedImage read_colours(const Reader& reader) {
   return std::move(image);
 }
 
-DecodedImage read_depth(const Reader& reader) {
+DecodedImage read_depth(const TiffReader& reader) {
   const bool is_float = reader.format == kFloat && reader.bits == 32;
   const maq_pixel_format format = is_float ? MAQ_PIXEL_DEPTH32F : MAQ_PIXEL_DEPTH16;
   if (!reader.is_grey() || (!is_float && (reader.bits != 16 || reader.format != kUnsigned))) {
@@ -307,7 +307,7 @@ DecodedImage read_depth(const Reader& reader) {
 template <class Read>
 DecodedImage decode(const EncodedBytes& bytes, const Read& read) {
   try {
-    return read(Reader(bytes));
+    return read(TiffReader(bytes));
   } catch (const Damage&) {
     return {};
   }

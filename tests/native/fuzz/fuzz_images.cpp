@@ -34,12 +34,39 @@ fuzz::Bytes picture() {
   return pixels;
 }
 
+fuzz::Bytes bmp() {
+  fuzz::Writer file;
+  file.text("BM")
+      .add(uint32_t(70))
+      .add(uint32_t(0))
+      .add(uint32_t(54))
+      .add(uint32_t(40))
+      .add(int32_t(2))
+      .add(int32_t(2));
+  file.add(uint16_t(1)).add(uint16_t(24)).add(uint32_t(0)).add(uint32_t(16));
+  for (int i = 0; i < 4; ++i) file.add(uint32_t(0));
+  return file.text(std::string(16, 'a')).bytes;
+}
+
+fuzz::Bytes tiff() {
+  constexpr std::pair<int, uint32_t> kEntries[] = {{256, 2},   {257, 2}, {258, 8}, {259, 1}, {262, 1},
+                                                   {273, 134}, {277, 1}, {278, 2}, {279, 4}, {284, 1}};
+  fuzz::Writer file;
+  file.text("II*").add('\0').add(uint32_t(8)).add(uint16_t(std::size(kEntries)));
+  for (const auto& [tag, value] : kEntries) file.add(uint16_t(tag)).add(uint16_t(4)).add(uint32_t(1)).add(value);
+  return file.add(uint32_t(0)).text("abcd").bytes;
+}
+
 std::vector<fuzz::Bytes> image_seeds() {
   const fuzz::Bytes pixels = picture();
   const ImageView colour = packed_view(MAQ_PIXEL_BGR8, 12, 10, pixels.data());
   const ImageView grey = packed_view(MAQ_PIXEL_GREY8, 12, 10, pixels.data());
-  return {encode_image(colour, ".png"), encode_image(grey, ".png"), encode_image(colour, ".jpg"),
-          encode_image(grey, ".jpg")};
+  return {encode_image(colour, ".png"),
+          encode_image(grey, ".png"),
+          encode_image(colour, ".jpg"),
+          encode_image(grey, ".jpg"),
+          bmp(),
+          tiff()};
 }
 
 std::vector<fuzz::Bytes> depth_seeds() {

@@ -23,6 +23,9 @@ from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, STD
 from export.densepose.network import MobileParsingRCNN
 
+# The dense head sees a box and this fraction of its width and height on each side, as in the C++ runtime.
+REGION_MARGIN = (0.03, 0.05)
+
 Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor], Tensor | None]]
 BoxHead = Callable[[Tensor], tuple[Tensor, Tensor]]
 DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
@@ -117,15 +120,26 @@ def infer(
     height, width = image.shape[:2]
     found = detect(graphs, image, network, config)
     iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
-    if len(found.boxes):
-        maps = graphs.dense_head(tg.pooled(found.features, [found.boxes], network, network.dense_pool, level=0))
-    boxes = found.boxes * found.boxes.new_tensor(found.scale * 2)
+    inner = (round(height / found.scale[1]), round(width / found.scale[0]))
+    regions = regions_of(found.boxes, *inner)
+    if len(regions):
+        maps = graphs.dense_head(tg.pooled(found.features, [regions], network, network.dense_pool, level=0))
+    to_image = found.boxes.new_tensor(found.scale * 2)
+    boxes = found.boxes * to_image
     painted: list[int] = []
-    for k, box in enumerate(boxes):
+    for k, region in enumerate(regions * to_image):
         # A box without a body is a false alarm; one whose body is another person's already shows that person again.
-        if paint([m[k] for m in maps], box.tolist(), len(painted) + 1, iuv, instance, config):
+        if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
+
+
+def regions_of(boxes: Tensor, height: int, width: int) -> Tensor:
+    """What the dense head sees of people: boxes [K, 4] in pixels of the input, wider by REGION_MARGIN on each side,
+    within the image."""
+    size = boxes[:, 2:] - boxes[:, :2]
+    margin = size * size.new_tensor(REGION_MARGIN)
+    return bx.clip(torch.cat([boxes[:, :2] - margin, boxes[:, 2:] + margin], 1), height, width)
 
 
 def _people(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, proposed: Tensor, network: NetworkConfig,

@@ -135,7 +135,7 @@ def infer(
 
 
 def regions_of(boxes: Tensor, height: int, width: int) -> Tensor:
-    """What the dense head sees of people: boxes [K, 4] in pixels of the input, wider by REGION_MARGIN on each side,
+    """Returns the regions for the dense head: boxes [K, 4] in pixels of the input, wider by REGION_MARGIN on each side,
     within the image."""
     size = boxes[:, 2:] - boxes[:, :2]
     margin = size * size.new_tensor(REGION_MARGIN)

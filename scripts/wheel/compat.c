@@ -33,6 +33,13 @@ int lstat64(const char* path, struct stat* to) { return lstat(path, to); }
 int fstat64(int file, struct stat* to) { return fstat(file, to); }
 int fstatat64(int folder, const char* path, struct stat* to, int flags) { return fstatat(folder, path, to, flags); }
 
+/* Never a part of libc.so: it names the library whose functions they are. */
+extern void* __dso_handle __attribute__((visibility("hidden")));
+int __register_atfork(void (*)(void), void (*)(void), void (*)(void), void*);
+int pthread_atfork(void (*before)(void), void (*in_parent)(void), void (*in_child)(void)) {
+  return __register_atfork(before, in_parent, in_child, __dso_handle);
+}
+
 /* 2.36 */
 uint32_t arc4random(void) {
   uint32_t number = 0;

@@ -22,7 +22,7 @@ usage() { sed -n '2,17s/^# \{0,1\}//p' "$0"; }
 
 for group in "${@:-}"; do
     case "$group" in
-        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | release | site) ;;
+        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | wheel | release | site) ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac

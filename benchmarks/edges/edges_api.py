@@ -10,9 +10,10 @@ from typing import Any
 
 import maquette
 import numpy as np
-from maquette.edges import KINDS, TYPES
 
 LINE, ARC, SPLINE = range(3)
+TYPES = ("line", "arc", "spline")
+KINDS = ("none", "crease", "boundary")
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,10 +124,10 @@ MAQ_API maq_status maq_head_builder_add_photo(maq_head_builder* builder, const m
 
 /* Uses `head` as prior for later fits, which do not need its photos again. `head` must show the same person and come
  * from the same bundle. A builder has one prior head: another call replaces it. In a head that is fitted afterwards,
- * the cameras of `head` come first, unchanged. A known size stays. Colours depend more on this builder's photos. Unless the
- * config has MAQ_HEAD_TEXTURE_OFF, the texture of `head` fills the parts that these photos do not show. `head` is not kept.
- * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (it has more than 192 photos), MAQ_ERROR_UNSUPPORTED (another
- * bundle, or a file of version 1). Blocks for some milliseconds. */
+ * the cameras of `head` come first, unchanged. A known size stays. Colours depend more on this builder's photos. Unless
+ * the config has MAQ_HEAD_TEXTURE_OFF, the texture of `head` fills the parts that these photos do not show. `head` is
+ * not kept. One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (it has more than 192 photos), MAQ_ERROR_UNSUPPORTED
+ * (another bundle, or a file of version 1). Blocks for some milliseconds. */
 MAQ_API maq_status maq_head_builder_add_head(maq_head_builder* builder, const maq_head* head);
 
 /* Forgets the photos and the prior head. Another person's head can be fitted afterwards.

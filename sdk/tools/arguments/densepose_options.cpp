@@ -8,7 +8,9 @@
 
 void add_model_options(CLI::App& command, ModelOptions& options) {
   add_network_options(command, options, "MAQ_BUNDLE");
-  command.add_option("--size", options.size, "Long side of the network's input in pixels (default: 288, and 480 as well where people are small)")
+  command
+      .add_option("--size", options.size,
+                  "Long side of the network's input in pixels (default: 288, and 480 as well where people are small)")
       ->check(CLI::Range(32, 2048));
   command.add_option("--threshold", options.threshold, "Minimum score of a person")->check(CLI::Range(0.0f, 1.0f));
   command

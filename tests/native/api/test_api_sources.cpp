@@ -291,6 +291,12 @@ TEST(ApiSources, ClipsNeedTheirProgramAndNothingElseDoes) {
   write_text(sdk.beside("ffmpeg"), "#!/bin/sh\necho nonsense\n");
   std::filesystem::permissions(sdk.beside("ffmpeg"), std::filesystem::perms::owner_all);
   EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_ERROR_UNREADABLE) << sdk.last_error();
+  // New versions of FFmpeg have another name for the file's time base.
+  write_text(sdk.beside("ffmpeg"),
+             "#!/bin/bash\n[[ \"$*\" == *'-enc_time_base demux'* ]] || { echo 'Invalid time base: -1' >&2; exit 1; }\n"
+             "exec ffmpeg \"${@/#demux/-1}\"\n");
+  std::filesystem::permissions(sdk.beside("ffmpeg"), std::filesystem::perms::owner_all);
+  EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_OK) << sdk.last_error();
   ASSERT_EQ(unsetenv("MAQ_FFMPEG"), 0);
   EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_OK) << sdk.last_error();
   EXPECT_EQ(sdk.open("stub:people"), MAQ_ERROR_NOT_FOUND) << "an app does not carry the sprites";

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -26,6 +27,7 @@ namespace {
 // Containers and raw streams of clips. Others, such as lists of files, would open more than the file.
 constexpr char kFormats[] =
     "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,ivf,h264,hevc,m4v,mjpeg,nut,yuv4mpegpipe,dv,mxf,rm";
+constexpr char kUnknownTimeBase[] = "nvalid time base";  // in the program's messages
 constexpr size_t kTextBytes = 16 << 10;
 constexpr rlim_t kProgramBytes = rlim_t(1) << 30;  // more than it takes
 
@@ -94,6 +96,15 @@ double duration_in(const std::string& text) {
 }  // namespace
 
 ClipReader::ClipReader(const std::string& path, double start_s) {
+  // The file's time base, so that times stay exact: its name in old and in new versions of FFmpeg.
+  static constexpr const char* kTimeBases[] = {"-1", "demux"};
+  static std::atomic<int> known{0};
+  const int first = known;
+  if (start(path, start_s, kTimeBases[first])) return;
+  if (start(path, start_s, kTimeBases[1 - first])) known = 1 - first;
+}
+
+bool ClipReader::start(const std::string& path, double start_s, const char* time_base) {
   const char* const named = std::getenv("MAQ_FFMPEG");
   const std::string program = named != nullptr && *named != '\0' ? named : "ffmpeg";
   int ends[2] = {-1, -1};
@@ -113,7 +124,7 @@ ClipReader::ClipReader(const std::string& path, double start_s) {
       "-format_whitelist", kFormats};
   if (start_us > 0) arguments.insert(arguments.end(), {"-ss", start});
   arguments.insert(arguments.end(), {"-i", input.c_str(), "-map", "0:V:0", "-c:v", "rawvideo", "-pix_fmt", "bgr24",
-                                     "-enc_time_base", "-1", "-f", "nut", "pipe:1", nullptr});
+                                     "-enc_time_base", time_base, "-f", "nut", "pipe:1", nullptr});
   const SpawnSettings settings(write_end.get(), messages_.get());
   const int error = ::posix_spawnp(&process_.id, program.c_str(), &settings.actions, &settings.attributes,
                                    const_cast<char* const*>(arguments.data()), environ);
@@ -124,11 +135,10 @@ ClipReader::ClipReader(const std::string& path, double start_s) {
   write_end.reset();
   stream_ = std::make_unique<NutStream>(images_.get());
   duration_s_ = duration_in(text_at(messages_.get(), 0));
-  if (!stream_->is_open()) require_memory_of_program();
+  return stream_->is_open() || end_of_program().find(kUnknownTimeBase) == std::string::npos;
 }
 
-// Throws std::bad_alloc if the program ended for lack of memory. It must have closed the pipe.
-void ClipReader::require_memory_of_program() {
+std::string ClipReader::end_of_program() {
   images_.reset();
   const int status = process_.wait();
   const off_t end = ::lseek(messages_.get(), 0, SEEK_END);
@@ -139,6 +149,7 @@ void ClipReader::require_memory_of_program() {
   if (says_out_of_memory(text) || (is_limited && (!WIFEXITED(status) || WEXITSTATUS(status) != 0))) {
     throw std::bad_alloc();
   }
+  return text;
 }
 
 ClipReader::Process::~Process() {
@@ -160,7 +171,7 @@ int ClipReader::Process::wait() {
 bool ClipReader::read(ImageView& image, int64_t& time_ns) {
   if (!has_frames() || !images_.is_open()) return false;
   if (!stream_->read(pixels_, time_ns)) {
-    require_memory_of_program();
+    end_of_program();
     return false;
   }
   image = packed_view(MAQ_PIXEL_BGR8, width_px(), height_px(), pixels_.data());

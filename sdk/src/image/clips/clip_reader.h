@@ -31,7 +31,11 @@ class ClipReader {
   bool read(ImageView& image, int64_t& time_ns);
 
  private:
-  void require_memory_of_program();
+  // Starts the program. Returns false if it does not know `time_base`.
+  bool start(const std::string& path, double start_s, const char* time_base);
+  // Waits for the end of the program, and returns its last messages. Throws std::bad_alloc if it ended for lack of
+  // memory. It must have closed the pipe.
+  std::string end_of_program();
 
   // Ends with its owner.
   struct Process {

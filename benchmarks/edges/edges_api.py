@@ -50,7 +50,7 @@ class EdgesResult:
 
     @staticmethod
     def of(found: maquette.EdgesResult) -> EdgesResult:
-        curves = None if found.curves is None else Curves.of(found.curves)
+        curves = Curves.of(found.curves) if hasattr(found, "curves") else None
         return EdgesResult(found.distance_r, found.expected_error_r, found.kind, SimpleNamespace(**found.stats), curves)
 
 

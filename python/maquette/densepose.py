@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from maquette.frames import ImageLike, as_frame
-from maquette.native import Lender, LentResult, NativeObject, native
+from maquette.native import Lender, LentResult, NativeObject, native, path_to_write
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -72,18 +72,23 @@ class DensePoseResult:
         return out
 
     def painted(self, image: ImageLike, opacity: float = 0.7) -> np.ndarray:
-        """A copy of the image, uint8 [H, W, 3] RGB, with the people in the colours of their parts."""
-        rgb = image if isinstance(image, np.ndarray) else as_frame(image).pixels()
+        """A copy of the image, uint8 [H, W, 3] RGB, with the people in the colours of their parts. Raises ValueError
+        for an image of another size."""
+        out = as_frame(image).pixels()
+        if out.shape[:2] != self.part.shape:
+            sizes = [f"{width} x {height}" for height, width in (out.shape[:2], self.part.shape)]
+            raise ValueError(
+                f"The image has {sizes[0]} pixels, but the result {sizes[1]}; pass the image of the result."
+            )
         body = self.part > 0
-        out = rgb.copy()
         colours = part_colours()[self.part[body]]
-        out[body] = np.round((1 - opacity) * rgb[body] + opacity * colours).astype(np.uint8)
+        out[body] = np.round((1 - opacity) * out[body] + opacity * colours).astype(np.uint8)
         return out
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes <path>_IUV.png, <path>_INDS.png and <path>.json in the DensePose convention
         (docs/reference/formats.md). Works for the latest 8 results of a `DensePose`. Raises MaquetteError."""
-        native().call("maq_densepose_result_save", self._lent.handle, os.fsencode(path))
+        native().call("maq_densepose_result_save", self._lent.handle, path_to_write(path))
 
     def __repr__(self) -> str:
         height, width = self.part.shape

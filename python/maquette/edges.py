@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from maquette.frames import Frame, ImageLike, Intrinsics, as_depth
-from maquette.native import Lender, LentResult, NativeObject, native
+from maquette.native import Lender, LentResult, MaquetteError, NativeObject, native, path_to_write
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,7 +92,7 @@ class Curves(NativeObject):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes .json, .obj, .ply, .dxf or .step. Raises MaquetteError."""
-        native().call("maq_edges_curves_save", self.handle, os.fsencode(path))
+        native().call("maq_edges_curves_save", self.handle, path_to_write(path))
 
     def snap(self, x_px: float, y_px: float, radius_px: float = 8) -> tuple[str, np.ndarray] | None:
         """Finds the target at a pixel of the depth image: the nearest corner within the radius, or else the nearest
@@ -132,26 +132,33 @@ def _closed_curves(state: dict[str, Any]) -> Curves:
 class EdgesResult:
     """Planes [H, W] of a depth image. distance_r: float32, distance to the nearest sharp curve in footprints r; eps_r
     where no curve is nearer. expected_error_r: float32, predicted mean absolute error of distance_r. kind: uint8 (0
-    none, 1 crease, 2 boundary). distance_m: float32, 0 where depth is unknown. curves: None unless requested. stats:
-    the fields of maq_edges_stats."""
+    none, 1 crease, 2 boundary). distance_m: float32, 0 where depth is unknown. stats: the fields of
+    maq_edges_stats."""
 
     distance_r: np.ndarray
     expected_error_r: np.ndarray
     kind: np.ndarray
     distance_m: np.ndarray
     eps_r: float
-    curves: Curves | None
     stats: dict[str, Any]
     _lent: LentResult = field(repr=False)
+    _curves: Curves | None = None
+
+    @property
+    def curves(self) -> Curves:
+        """Curves, corners and boxes. Raises AttributeError if they were not requested."""
+        if self._curves is None:
+            raise AttributeError("This result has no curves: Edges.run(..., curves=True) or EdgesModel(curves=True).")
+        return self._curves
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes <path>_distance.png, <path>_kind.png and <path>_edges.json (docs/reference/formats.md). Works for the
         latest 16 results of an `Edges`. Raises MaquetteError."""
-        native().call("maq_edges_result_save", self._lent.handle, os.fsencode(path))
+        native().call("maq_edges_result_save", self._lent.handle, path_to_write(path))
 
     def __repr__(self) -> str:
         height, width = self.kind.shape
-        curves = "" if self.curves is None else f", {self.curves._about()}"
+        curves = "" if self._curves is None else f", {self._curves._about()}"
         return f"<EdgesResult {width} x {height}{curves}>"
 
 
@@ -179,14 +186,14 @@ class Edges(NativeObject):
         **curve_settings: Unpack[CurvesSettings],
     ) -> EdgesResult:
         """depth: a Frame with its intrinsics, float32 [H, W] in metres, uint16 [H, W] in millimetres, or the path of a
-        depth image in millimetres. intrinsics: for all but a Frame. curves: also find curves, corners and boxes.
-        curve_settings: fields of maq_edges_curves_config. One call at a time. Raises MaquetteError; ValueError for a
-        Frame with other intrinsics."""
+        depth image in millimetres. intrinsics: of the camera, unless the Frame has them. curves: also find curves,
+        corners and boxes. curve_settings: fields of maq_edges_curves_config. One call at a time. Raises MaquetteError;
+        ValueError for a Frame with other intrinsics."""
+        config = curves_config(curves, curve_settings)
         result = self.run_native(depth, intrinsics)
         found = None
-        if curves:
+        if config is not None:
             n = native()
-            config = n.config("maq_edges_curves_config", curve_settings)
             find, release = "maq_edges_result_find_curves", "maq_edges_curves_release"
             found = Curves(n.create("maq_edges_curves", result, config, function=find, release=release))
         return edges_result(result, self._lender.lend(result), found)
@@ -195,11 +202,24 @@ class Edges(NativeObject):
         """Returns the library's own result (maq_edges_result), for calls of the C API that this package does not have.
         It goes back to its pool when the object is freed."""
         if isinstance(depth, Frame) and intrinsics is not None and depth.intrinsics != intrinsics:
-            raise ValueError("The frame has its own intrinsics; wrap an array as Frame(depth, intrinsics=...) instead.")
+            if depth.intrinsics is not None:
+                problem = "The frame has its own intrinsics; wrap an array as Frame(depth, intrinsics=...) instead."
+                raise ValueError(problem)
+            depth = Frame(depth.depth(), timestamp_ns=depth.timestamp_ns, intrinsics=intrinsics)
         frame = as_depth(depth, intrinsics)
         self._lender.make_room()
         run, release = "maq_edges_run", "maq_edges_result_release"
-        return native().create("maq_edges_result", self.handle, frame.handle, function=run, release=release)
+        try:
+            return native().create("maq_edges_result", self.handle, frame.handle, function=run, release=release)
+        except MaquetteError as error:
+            if "does not carry the intrinsics" not in error.text:
+                raise
+            height_px, width_px = frame.shape
+            problem = (
+                "Edges need the intrinsics of the camera: run(depth, intrinsics), with a maquette.Intrinsics such as "
+                f"Intrinsics.centred({width_px}, {height_px}, fov_deg=60) or focal_px=600."
+            )
+            raise MaquetteError(problem, error.status) from None
 
     def copied(self, result: Any) -> EdgesResult:
         """Copies a result of `run_native` to arrays."""
@@ -214,6 +234,14 @@ def edges_config(bundle: str | os.PathLike[str] | None, settings: EdgesSettings)
     """A maq_edges_config."""
     own = {} if bundle is None else {"bundle_path": bundle}
     return native().config("maq_edges_config", {"result_pool_size": 16, **settings, **own})
+
+
+def curves_config(curves: bool, settings: CurvesSettings) -> Any:
+    """A maq_edges_curves_config; None without curves. Raises TypeError for settings without curves."""
+    config = native().config("maq_edges_curves_config", settings, ("curves", "intrinsics"))
+    if settings and not curves:
+        raise TypeError(f"{next(iter(settings))} is a setting of curves: add curves=True.")
+    return config if curves else None
 
 
 def edges_result(result: Any, lent: LentResult, curves: Curves | None = None) -> EdgesResult:
@@ -232,7 +260,7 @@ def edges_result(result: Any, lent: LentResult, curves: Curves | None = None) ->
     metres = np.empty(shape, np.float32)
     n.call("maq_edges_result_copy_distance_m", result, n.ffi.from_buffer("float[]", metres), metres.size)
     stats = n.stats("maq_edges_stats", "maq_edges_result_get_stats", result)
-    return EdgesResult(distance, error, kinds, metres, about.eps_r, curves, stats, lent)
+    return EdgesResult(distance, error, kinds, metres, about.eps_r, stats, lent, curves)
 
 
 def _doubles(pointer: Any, *shape: int) -> np.ndarray:

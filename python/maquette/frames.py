@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 
-from maquette.native import NativeObject, native
+from maquette.native import MaquetteError, NativeObject, native, path_to_write
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -68,10 +68,19 @@ class Intrinsics:
         return f"<Intrinsics {self.width_px} x {self.height_px}, focal length {focal}{lens}>"
 
     @staticmethod
-    def centred(width_px: int, height_px: int, fov_deg: float) -> Intrinsics:
-        """Square pixels, the principal point in the middle; fov_deg: horizontal angle of view."""
-        focal = width_px / 2 / math.tan(math.radians(fov_deg) / 2)
-        return Intrinsics(width_px, height_px, focal, focal, (width_px - 1) / 2, (height_px - 1) / 2)
+    def centred(
+        width_px: int, height_px: int, fov_deg: float | None = None, focal_px: float | None = None
+    ) -> Intrinsics:
+        """Square pixels, the principal point in the middle. Give the horizontal angle of view, fov_deg, or the focal
+        length, focal_px. Raises ValueError for none or both."""
+        if (fov_deg is None) == (focal_px is None):
+            raise ValueError(
+                "Give either fov_deg, the horizontal angle of view, or focal_px, the focal length in pixels."
+            )
+        if fov_deg is not None:
+            focal_px = width_px / 2 / math.tan(math.radians(fov_deg) / 2)
+        assert focal_px is not None
+        return Intrinsics(width_px, height_px, focal_px, focal_px, (width_px - 1) / 2, (height_px - 1) / 2)
 
     def write_to(self, struct: Any) -> None:
         """Fills a maq_intrinsics."""
@@ -151,7 +160,10 @@ class Frame(NativeObject):
         0.001 for millimetres; `intrinsics` are of its camera. Raises MaquetteError, and OSError for a file that cannot
         be read."""
         if depth_unit_m is None:
-            return Frame.decode(Path(path).read_bytes())
+            try:
+                return Frame.decode(Path(path).read_bytes())
+            except MaquetteError as error:
+                raise MaquetteError(error.text.replace("The image in memory", str(path)), error.status) from None
         with open(path, "rb"):  # a missing file is Python's FileNotFoundError
             n, escaped = native(), os.fspath(path).replace("%", "%25").replace("?", "%3F")
         uri = f"image:{escaped}?depth_unit={depth_unit_m:g}".encode()
@@ -283,7 +295,7 @@ class Frame(NativeObject):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes .png or .jpg; depth as .png in millimetres or .tif in metres. Raises MaquetteError."""
-        native().call("maq_frame_save", self.handle, os.fsencode(path))
+        native().call("maq_frame_save", self.handle, path_to_write(path))
 
 
 def _pixel_format(format: PixelFormat | str) -> PixelFormat:

@@ -44,7 +44,8 @@ class EdgesFusion(NativeObject):
 
     def add_view(self, depth: ImageLike, camera: PinholeCamera) -> EdgesResult:
         """Runs the network on a depth image and adds its field. Returns the field."""
-        result = self._edges.run_native(depth, None if isinstance(depth, Frame) else camera.intrinsics)
+        has_intrinsics = isinstance(depth, Frame) and depth.intrinsics is not None
+        result = self._edges.run_native(depth, None if has_intrinsics else camera.intrinsics)
         self.add_native(result, camera)
         return self._edges.copied(result)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from maquette.frames import ImageLike, as_depth, as_frame
 from maquette.images import Image, rendered
-from maquette.native import Lender, NativeObject, ProgressCallback, native
+from maquette.native import Lender, NativeObject, ProgressCallback, native, path_to_write
 from maquette.scenes import PinholeCamera, Progress
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ class HeadMesh(NativeObject):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh for other programs: .glb, .obj with a .mtl beside it, or .ply. GLB and OBJ have the texture,
         GLB also the morph targets. In files x is to the person's left, y up, z to the front. Raises MaquetteError."""
-        native().call("maq_head_mesh_save", self.handle, os.fsencode(path))
+        native().call("maq_head_mesh_save", self.handle, path_to_write(path))
 
     def _about(self) -> str:
         return f"{self._data.vertex_count} vertices, {self._data.triangle_count} triangles"
@@ -196,7 +196,7 @@ class Head(NativeObject):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a head file (.maqh), some 64 KB and the texture, atomically. Raises MaquetteError."""
-        native().call("maq_head_save", self.handle, os.fsencode(path))
+        native().call("maq_head_save", self.handle, path_to_write(path))
 
     @property
     def info(self) -> HeadInfo:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from maquette.native import Lender, LentResult, native
+from maquette.native import Lender, LentResult, native, path_to_write
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Image:
         of a renderer. Raises MaquetteError."""
         n = native()
         which = n.lib.MAQ_IMAGE_ALPHA_ON if alpha else n.lib.MAQ_IMAGE_ALPHA_OFF
-        n.call("maq_image_save", self._lent.handle, os.fsencode(path), which)
+        n.call("maq_image_save", self._lent.handle, path_to_write(path), which)
 
     def __repr__(self) -> str:
         height, width = self.alpha.shape

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import functools
 import importlib.util
 import os
+import re
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -59,6 +61,21 @@ def sample(name: str) -> Path:
             f"There is no sample {name!r}; there are photo.jpg and box_depth.png.", "MAQ_ERROR_NOT_FOUND"
         )
     return found
+
+
+def path_to_write(path: str | os.PathLike[str]) -> bytes:
+    """The path for the C API, with its folder made. The library says why a folder cannot be made."""
+    with contextlib.suppress(OSError):
+        os.makedirs(os.path.dirname(os.path.abspath(os.fsdecode(path))), exist_ok=True)
+    return os.fsencode(path)
+
+
+def as_python(problem: str) -> str:
+    """The library's sentence about a problem, with the advice for Python where it differs."""
+    missing = re.search(r"bundle_path is NULL, but .*/models/(\w+)\S* does not exist", problem)
+    if missing is None or library_path() != _IN_WHEEL:
+        return problem
+    return f"The networks of {missing[1]} are not installed: pip install 'maquette[{missing[1]}]'"
 
 
 def name_ffmpeg() -> None:
@@ -125,7 +142,7 @@ class Native:
     def fail(self, function: str, status: int) -> None:
         text = self.lib.maq_last_error(self.ffi.NULL)
         name = self.status_name(status)
-        raise MaquetteError(self.ffi.string(text).decode() if text else f"{function} failed", name)
+        raise MaquetteError(as_python(self.text(text)) or f"{function} failed", name)
 
     def create(self, kind: str, *arguments: Any, function: str = "", release: str = "") -> Any:
         """A handle `kind *` written by `function` (KIND_create) to its last argument; freed with the object that is
@@ -134,9 +151,10 @@ class Native:
         self.call(function or f"{kind}_create", *arguments, out)
         return self.ffi.gc(out[0], getattr(self.lib, release or f"{kind}_destroy"))
 
-    def config(self, kind: str, settings: Mapping[str, Any]) -> Any:
+    def config(self, kind: str, settings: Mapping[str, Any], arguments: Sequence[str] = ()) -> Any:
         """A struct of the C API with its defaults and the settings, by the names of its fields. The fields of its
-        maq_model_options, if it has them, are settings too: threads, bundle_path, ..."""
+        maq_model_options, if it has them, are settings too: threads, bundle_path, ... arguments: other names of the
+        function in Python, for the advice about wrong ones."""
         struct = self.ffi.new(f"{kind} *")
         self.call(f"{kind}_init", struct, self.ffi.sizeof(kind))
         fields = {name: (struct, field.type) for name, field in self.ffi.typeof(kind).fields}
@@ -147,9 +165,9 @@ class Native:
         kept = []
         for name, value in settings.items():
             if name not in fields:
-                raise TypeError(f"{kind} has no field {name}; it has {', '.join(sorted(fields))}")
+                raise TypeError(_advice(kind, name, [*arguments, *fields]))
             owner, of_type = fields[name]
-            if of_type.kind == "enum" and isinstance(value, str):
+            if of_type.kind == "enum" and isinstance(value, (str, bool)):
                 value = self.value_of(of_type.cname, value, name)
             elif of_type.kind == "pointer" and isinstance(value, (str, os.PathLike)):
                 value = self.ffi.new("char[]", os.fsencode(value))
@@ -165,11 +183,12 @@ class Native:
         """Values of an enum by short names: "off", "auto" and "all" of maq_densepose_crops."""
         return enum_names(self.ffi.typeof(kind))
 
-    def value_of(self, kind: str, name: str, argument: str) -> int:
+    def value_of(self, kind: str, name: str | bool, argument: str) -> int:
         """The value of an enum by its short name. Raises ValueError with all names."""
         names = self.names_of(kind)
-        if name not in names:
-            raise ValueError(f'{argument} is "{name}"; it is one of {", ".join(names)}')
+        if not isinstance(name, str) or name not in names:
+            given = f'"{name}"' if isinstance(name, str) else repr(name)
+            raise ValueError(f"{argument} is {given}; it is one of {', '.join(names)}")
         return names[name]
 
     def name_of(self, kind: str, value: int) -> str:
@@ -233,6 +252,16 @@ class Native:
         for index in range(count):
             self.call(function, handle, index, struct)
             yield struct
+
+
+def _advice(kind: str, name: str, names: Sequence[str]) -> str:
+    """A sentence about a wrong name of a setting, with the nearest right one."""
+    known = sorted(
+        name for name in names if not name.startswith("bundle_file") and not name.endswith(("_callback", "_data"))
+    )
+    near = difflib.get_close_matches(name, known, 1)
+    guess = f"; did you mean {near[0]}?" if near else "."
+    return f"There is no setting {name}{guess} The settings are {', '.join(known)} ({kind})."
 
 
 class NativeObject:

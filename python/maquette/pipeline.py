@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from maquette.densepose import DensePoseResult, densepose_config, densepose_result, surface_points
-from maquette.edges import Curves, EdgesResult, edges_config, edges_result
+from maquette.densepose import DensePoseResult, Person, densepose_config, densepose_result, surface_points
+from maquette.edges import Curves, EdgesResult, curves_config, edges_config, edges_result
 from maquette.frames import Frame
-from maquette.native import LentResult, NativeObject, native
+from maquette.native import LentResult, NativeObject, as_python, native, path_to_write
 from maquette.prediction import Novelty, NoveltyScore, Predictor, novelty_score
+from maquette.sources import uri_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -66,7 +67,7 @@ class EdgesModel(Model):
     ) -> None:
         n = native()
         config = edges_config(bundle, settings)
-        with_curves = n.config("maq_edges_curves_config", curve_settings or {}) if curves else n.ffi.NULL
+        with_curves = curves_config(curves, curve_settings or {}) or n.ffi.NULL
         super().__init__(n.create("maq_model", n.context, config, with_curves, function="maq_edges_model_create"))
 
 
@@ -98,9 +99,14 @@ class PipelineResult(NativeObject):
     def frame(self) -> Frame:
         return Frame.of_handle(self._part("maq_pipeline_result_get_frame"))
 
+    @property
+    def people(self) -> list[Person]:
+        """The people, of a `DensePoseModel`; empty with another model."""
+        return [] if self.densepose is None else self.densepose.people
+
     @functools.cached_property
-    def people(self) -> DensePoseResult | None:
-        """The people, of a `DensePoseModel`."""
+    def densepose(self) -> DensePoseResult | None:
+        """The people and the planes, of a `DensePoseModel`."""
         part = self._part("maq_pipeline_result_get_densepose")
         return None if part is None else densepose_result(part, LentResult(part))
 
@@ -133,7 +139,8 @@ class PipelineResult(NativeObject):
 
     @property
     def stats(self) -> dict[str, Any]:
-        """Number and times: the fields of maq_pipeline_result_stats."""
+        """Number and times: the fields of maq_pipeline_result_stats. age_ms: from the capture of the frame to the
+        result; -1 for a source that is not live, such as a file."""
         return native().stats("maq_pipeline_result_stats", "maq_pipeline_result_get_stats", self.handle)
 
 
@@ -152,7 +159,7 @@ class Pipeline(NativeObject):
     """Runs a model on the newest frame of a source; frames that come meanwhile are dropped. Iterate over it.
 
         for result in maquette.Pipeline("camera:", maquette.DensePoseModel()):
-            print(len(result.people.people))
+            print(len(result.people))
 
     on_result: called with each `PipelineResult` on the library's thread, instead of `read`. on_state: called with the
     state and a sentence about a problem. What they raise is printed. source_settings: fields of maq_source_config.
@@ -180,7 +187,7 @@ class Pipeline(NativeObject):
         if on_state is not None:
 
             def state_changed(_: Any, state: int, __: int, problem: Any) -> None:
-                on_state(n.name_of("maq_pipeline_state", state), n.text(problem))
+                on_state(n.name_of("maq_pipeline_state", state), as_python(n.text(problem)))
 
             own["state_callback"] = n.ffi.callback("maq_pipeline_state_callback", state_changed)
         self._callbacks = own  # as long as the pipeline, which has their addresses
@@ -195,10 +202,13 @@ class Pipeline(NativeObject):
 
     def set_source(self, uri: str | os.PathLike[str]) -> None:
         """Opens a source and replaces the current one; `info` tells of errors."""
-        native().call("maq_pipeline_set_source", self.handle, os.fsencode(uri))
+        native().call("maq_pipeline_set_source", self.handle, uri_of(uri))
 
     def set_model(self, model: Model | None) -> None:
-        """Loads a model and replaces the current one; None: results have only frames."""
+        """Loads a model and replaces the current one; None: results have only frames. Raises TypeError for an object
+        that is no model."""
+        if model is not None and not isinstance(model, Model):
+            raise TypeError(_not_a_model(model))
         n = native()
         n.call("maq_pipeline_set_model", self.handle, n.ffi.NULL if model is None else model.handle)
 
@@ -212,7 +222,7 @@ class Pipeline(NativeObject):
     def record(self, path: str | os.PathLike[str] | None) -> None:
         """Records the frames from now on to a file (.maqrec) that does not exist; None finishes the recording."""
         n = native()
-        name = n.ffi.NULL if path is None else os.fsencode(path)
+        name = n.ffi.NULL if path is None else path_to_write(path)
         n.call("maq_pipeline_set_recording", self.handle, name)
 
     def stop(self) -> None:
@@ -236,7 +246,7 @@ class Pipeline(NativeObject):
         info = n.sized("maq_pipeline_info")
         n.call("maq_pipeline_get_info", self.handle, info)
         state, status = n.name_of("maq_pipeline_state", info.state), n.status_name(info.status)
-        return PipelineInfo(state, status, n.text(info.problem), n.text(info.source_uri))
+        return PipelineInfo(state, status, as_python(n.text(info.problem)), n.text(info.source_uri))
 
     @property
     def stats(self) -> dict[str, Any]:
@@ -245,6 +255,20 @@ class Pipeline(NativeObject):
 
     def _about(self) -> str:
         return self.info.state
+
+
+def _not_a_model(given: Any) -> str:
+    """A sentence with the model that the caller wants: DensePoseModel for a DensePose, or for a class."""
+    arguments = {"DensePoseModel": "", "EdgesModel": "", "PredictionModel": "predictor, ahead_s=0.1"}
+    name = given.__name__ if isinstance(given, type) else type(given).__name__
+    model = {"Predictor": "PredictionModel", "Novelty": "PredictionModel"}.get(
+        name, name.replace("Model", "") + "Model"
+    )
+    wanted = (
+        [f"maquette.{model}({arguments[model]})"] if model in arguments else [f"maquette.{m}(…)" for m in arguments]
+    )
+    what = f"the class {name}" if isinstance(given, type) else f"{given!r:.60}"
+    return f"A pipeline has a model of its own, not {what}: pass {' or '.join(wanted)}."
 
 
 def _release(handle: Any, _: Any) -> None:

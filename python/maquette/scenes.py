@@ -11,7 +11,7 @@ import numpy as np
 
 from maquette.frames import Frame, ImageLike, Intrinsics, as_frame
 from maquette.images import Image, rendered
-from maquette.native import Lender, NativeObject, ProgressCallback, native
+from maquette.native import Lender, NativeObject, ProgressCallback, native, path_to_write
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -138,11 +138,11 @@ class Scene(NativeObject):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a scene file (.maqs), atomically. Raises MaquetteError."""
-        native().call("maq_scene_save", self.handle, os.fsencode(path))
+        native().call("maq_scene_save", self.handle, path_to_write(path))
 
     def save_ply(self, path: str | os.PathLike[str]) -> None:
         """Writes positions and mean colours for other programs. Raises MaquetteError."""
-        native().call("maq_scene_save_ply", self.handle, os.fsencode(path))
+        native().call("maq_scene_save_ply", self.handle, path_to_write(path))
 
     def _info(self) -> Any:
         info = native().sized("maq_scene_info")

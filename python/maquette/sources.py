@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from maquette.frames import Frame, ImageLike, Intrinsics, acquired_frame, as_frame
-from maquette.native import NativeObject, native
+from maquette.native import NativeObject, native, path_to_write
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -36,9 +36,10 @@ class Source(NativeObject):
 
     def __init__(self, uri: str | os.PathLike[str], **settings: Unpack[SourceSettings]) -> None:
         n = native()
+        name = uri_of(uri)
         config = n.config("maq_source_config", settings)
         self._uri = os.fspath(uri)
-        super().__init__(n.create("maq_source", n.context, os.fsencode(uri), config))
+        super().__init__(n.create("maq_source", n.context, name, config))
 
     @property
     def info(self) -> dict[str, Any]:
@@ -97,6 +98,16 @@ class Source(NativeObject):
         info = self.info
         live = ", live" if info["is_live"] else ""
         return f"{self._uri}, {info['width_px']} x {info['height_px']}, {info['fps']:g} frames a second{live}"
+
+
+def uri_of(uri: str | os.PathLike[str]) -> bytes:
+    """A URI or a path for the C API. Raises TypeError, with advice for numbers as OpenCV takes them."""
+    if not isinstance(uri, (str, os.PathLike)):
+        raise TypeError(
+            f'A source is a URI or a path, not {uri!r:.60}: "camera:" is the first camera, "v4l2:/dev/video0" a '
+            "certain one. maquette.list_cameras() and the command `maquette sources` list them."
+        )
+    return os.fsencode(uri)
 
 
 @dataclass(frozen=True)
@@ -204,7 +215,7 @@ class Recorder(_Writer):
         n = native()
         handle = n.ffi.NULL if source is None else source.handle
         config = n.config("maq_recorder_config", settings)
-        super().__init__(n.create("maq_recorder", n.context, os.fsencode(path), handle, config))
+        super().__init__(n.create("maq_recorder", n.context, path_to_write(path), handle, config))
 
     def add(self, image: ImageLike, time_s: float | None = None) -> None:
         """Adds a frame, and does not keep it. time_s: the time of an array (not of a path). Raises MaquetteError, also
@@ -231,4 +242,4 @@ class ClipWriter(_Writer):
 
     def __init__(self, path: str | os.PathLike[str], fps: float) -> None:
         n = native()
-        super().__init__(n.create("maq_clip", n.context, os.fsencode(path), float(fps)))
+        super().__init__(n.create("maq_clip", n.context, path_to_write(path), float(fps)))

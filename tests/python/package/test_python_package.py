@@ -129,7 +129,6 @@ def test_depth_in_metres_and_in_millimetres_are_one_scene(box):
 
     assert maquette.Frame(np.round(metres * 1000).astype(np.uint16)).depth() == pytest.approx(metres, abs=5.1e-4)
     assert np.abs(of_metres.distance_r - of_millimetres.distance_r)[metres > 0].mean() < 1
-    assert of_metres.curves is None
     wrapped = edges.run(maquette.Frame(metres, intrinsics=intrinsics))
     assert np.array_equal(wrapped.distance_r, of_metres.distance_r)
     with pytest.raises(maquette.MaquetteError, match="intrinsics"):
@@ -247,7 +246,11 @@ def test_a_camera_that_looks_at_a_point_sees_it_in_the_middle():
     ("call", "error", "text"),
     [
         (lambda: maquette.DensePose("nowhere"), maquette.MaquetteError, "nowhere.*MAQ_ERROR_NOT_FOUND"),
-        (lambda: maquette.DensePose(long_side=288), TypeError, "no field long_side; it has .*long_side_px"),
+        (
+            lambda: maquette.DensePose(long_side=288),
+            TypeError,
+            "no setting long_side; .*The settings are .*long_side_px",
+        ),
         (lambda: maquette.DensePose(long_side_px=-4), maquette.MaquetteError, "long_side_px"),
         (lambda: maquette.Frame(np.zeros((4, 4)), maquette.PixelFormat.BGR8), ValueError, r"BGR8 is uint8 \[H, W, 3\]"),
         (lambda: maquette.Frame(np.zeros((0, 4, 3), np.uint8)), maquette.MaquetteError, "MAQ_ERROR_"),

@@ -18,9 +18,11 @@ def test_a_pipeline_gives_people_and_ends():
     with maquette.Pipeline(PEOPLE, model) as pipeline:
         results = []
         for result in pipeline:
-            results.append((result.frame.sequence, result.people, result.edges, result.predicted, result.novelty))
+            results.append((result.frame.sequence, result.densepose, result.edges, result.predicted, result.novelty))
             assert result.stats["run_ms"] > 0
-            result.people.save  # noqa: B018
+            result.densepose.save  # noqa: B018
+            assert len(result.people) == 1
+            assert result.stats["age_ms"] == -1
         assert pipeline.info.state == "ended"
         assert pipeline.stats["result_count"] == 3
         assert model.surface().shape[0] == 24

@@ -82,7 +82,7 @@ def name_ffmpeg() -> None:
     """Lets the library read clips by the ffmpeg of the extra `clips`, unless MAQ_FFMPEG names another."""
     if "MAQ_FFMPEG" in os.environ or importlib.util.find_spec("imageio_ffmpeg") is None:
         return
-    import imageio_ffmpeg  # type: ignore[import-not-found,import-untyped]
+    import imageio_ffmpeg  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     with contextlib.suppress(RuntimeError):  # installed without its program
         os.environ["MAQ_FFMPEG"] = imageio_ffmpeg.get_ffmpeg_exe()

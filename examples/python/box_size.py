@@ -7,6 +7,6 @@ import maquette
 depth = maquette.Frame.open(sys.argv[1], depth_unit_m=0.001)
 height_px, width_px = depth.shape
 camera = maquette.Intrinsics.centred(width_px, height_px, fov_deg=float(sys.argv[2]))
-result = maquette.Edges().run(maquette.Frame(depth.depth(), intrinsics=camera), curves=True)
+result = maquette.Edges().run(depth, camera, curves=True)
 for box in result.curves.boxes:
     print(box)

@@ -1,12 +1,10 @@
 """Writes part, U and V of each pixel of the people in a photo: photo_to_iuv.py photo.jpg results/photo"""
 
 import sys
-from pathlib import Path
 
 import maquette
 
 photo, out = sys.argv[1:3]
-Path(out).parent.mkdir(parents=True, exist_ok=True)
 result = maquette.DensePose(person_crops="auto").run(photo)
 result.save(out)  # _IUV.png, _INDS.png and .json
 maquette.Frame(result.painted(photo)).save(f"{out}_painted.png")

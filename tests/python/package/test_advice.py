@@ -1,10 +1,13 @@
 """Mistakes of a first use: the sentence says what to write instead."""
 
+from pathlib import Path
+
 import maquette
 import numpy as np
 import pytest
 from maquette.native import as_python
 
+ROOT = Path(__file__).parents[3]
 DEPTH = np.ones((48, 64), np.float32)
 CAMERA = maquette.Intrinsics.centred(64, 48, fov_deg=60)
 
@@ -93,6 +96,15 @@ def test_the_sample_is_measured_with_its_focal_length(edges):
     for wrong in ({}, {"fov_deg": 60, "focal_px": 600}):
         with pytest.raises(ValueError, match="either fov_deg"):
             maquette.Intrinsics.centred(640, 480, **wrong)
+
+
+def test_programs_of_the_guides_run_on_the_samples(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    for page, written in (("box-size", "box.step"), ("dense-pose", "painted.png")):
+        program = (ROOT / f"docs/guide/{page}.md").read_text().split("```python\n")[1].split("```")[0]
+        exec(compile(program, page, "exec"), {})
+        assert (tmp_path / written).exists()
+    assert "<Box 439 ± 1 x 425 ± 3 x 411 ± 1 mm>\n" in capsys.readouterr().out
 
 
 def test_missing_folders_are_made(people, tmp_path):

@@ -15,6 +15,8 @@ import maquette, numpy as np, PIL.Image
 people = maquette.DensePose(long_side_px=384, person_crops="auto", threads=2, spinning="off", bundle_path=Path("a"))
 print(people.run(np.zeros((4, 6, 3), np.uint8)).iuv.shape, people.run(Path("a.jpg")))
 people.run(PIL.Image.new("L", (1, 1)))
+for result in maquette.Pipeline("camera:", maquette.DensePoseModel()):
+    print(len(result.people), maquette.Edges().run("a.png", maquette.Intrinsics.centred(4, 3, focal_px=5)).curves.boxes)
 maquette.Source("a.mp4", loop=1, queue_length=2)
 maquette.HeadBuilder(texture=True, texture_px=512).fit(seconds=3, progress=lambda done, stage: done < 0.5)
 maquette.Predictor("refined").push(maquette.Frame(np.zeros((4, 6, 3), np.uint8)))

@@ -96,12 +96,16 @@ void unpack_bits(const uint8_t* in, size_t size, std::vector<uint8_t>& out) {
   size_t at = 0, to = 0;
   while (to < out.size()) {
     if (at + 1 >= size) throw Damage();
-    const int head = int8_t(in[at++]);
-    if (head == -128) continue;
-    const size_t count = size_t(head < 0 ? 1 - head : head + 1), taken = head < 0 ? 1 : count;
+    const size_t head = in[at++];  // a signed byte
+    if (head == 128) continue;
+    const bool repeats = head > 128;
+    const size_t count = repeats ? 257 - head : head + 1, taken = repeats ? 1 : count;
     if (count > out.size() - to || taken > size - at) throw Damage();
-    if (head < 0) std::fill_n(out.begin() + ptrdiff_t(to), count, in[at]);
-    if (head >= 0) std::copy_n(in + at, count, out.begin() + ptrdiff_t(to));
+    if (repeats) {
+      std::fill_n(out.begin() + ptrdiff_t(to), count, in[at]);
+    } else {
+      std::copy_n(in + at, count, out.begin() + ptrdiff_t(to));
+    }
     at += taken;
     to += count;
   }

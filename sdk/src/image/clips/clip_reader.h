@@ -39,7 +39,7 @@ class ClipReader {
 
   // Ends with its owner.
   struct Process {
-    ~Process();
+    ~Process();  // NOLINT(performance-trivially-destructible): it does nothing on Android alone
     int wait();
     pid_t id = -1;
   };

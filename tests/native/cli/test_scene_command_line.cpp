@@ -236,7 +236,7 @@ TEST_F(SceneCommandLine, CtrlCLeavesTheOldFiles) {
                                 "' scene " +
                                 arguments + " >out.txt 2>err.txt";
     const int status = std::system(command.c_str());
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 1) << arguments << status;
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 130) << arguments << status;
     EXPECT_NE(read_text(file("err.txt")).find("Interrupted;"), std::string::npos) << read_text(file("err.txt"));
   };
   interrupted("render place.maqs --path orbit --seconds 600 --fps 240 --size 320x240 --out clip.mp4");

@@ -105,7 +105,7 @@ class DensePose {
   bool chooses_size_;           // among input sizes, at full quality
   DensePoseSettings settings_;  // resolved: with the bundle's values for defaults, and the threads in use
   DensePoseQuality full_;       // as configured
-  InputScales scales_;
+  InputScales scales_;          // used if chooses_size_
   std::unique_ptr<RunCancel> cancel_;
   std::unique_ptr<PersonDetector> detector_;
   std::unique_ptr<SurfaceMapper> mapper_;

@@ -303,6 +303,27 @@ TEST(ApiSources, ClipsNeedTheirProgramAndNothingElseDoes) {
   EXPECT_NE(sdk.last_error().find("share/maquette/stub/people.jpg"), std::string::npos) << sdk.last_error();
 }
 
+TEST(ApiSources, AClipThatCannotBeReadIsToldWithTheLastErrorOfItsProgram) {
+  LoneCopy sdk;
+  write_text(sdk.beside("text.mp4"), "no clip");
+  EXPECT_EQ(sdk.open(("video:" + sdk.beside("text.mp4")).c_str()), MAQ_ERROR_UNREADABLE);
+  const std::string said = "The program ffmpeg says: Invalid data found when processing input";
+  EXPECT_NE(sdk.last_error().find(said), std::string::npos) << sdk.last_error();
+
+  // A message may have any length and any bytes.
+  write_text(sdk.beside("ffmpeg"),
+             "#!/bin/bash\nprintf '[error] earlier\\n[mov @ 0x55] [fatal] no \\e[31matom \\xc3\\xbc %0999d\\nA "
+             "hint.\\n' 0 >&2\n");
+  std::filesystem::permissions(sdk.beside("ffmpeg"), std::filesystem::perms::owner_all);
+  ASSERT_EQ(setenv("MAQ_FFMPEG", sdk.beside("ffmpeg").c_str(), 1), 0);
+  EXPECT_EQ(sdk.open("video:" MAQ_TEST_MEDIA "/clip.mp4"), MAQ_ERROR_UNREADABLE);
+  ASSERT_EQ(unsetenv("MAQ_FFMPEG"), 0);
+  const std::string error = sdk.last_error();
+  const size_t at = error.find("says: no ?[31matom ?? 000");
+  ASSERT_NE(at, std::string::npos) << error;
+  EXPECT_EQ(error.size() - at, std::string("says: ").size() + 200);
+}
+
 TEST(ApiSources, CamerasOfLibcameraNeedTheirLibraryAndTheListOfCamerasDoesNot) {
   LoneCopy sdk;
   EXPECT_EQ(sdk.open("libcamera:0"), MAQ_ERROR_RUNTIME_LIBRARY);

@@ -29,6 +29,7 @@ constexpr char kFormats[] =
     "mov,matroska,avi,mpegts,mpeg,mpegvideo,flv,asf,ogg,ivf,h264,hevc,m4v,mjpeg,nut,yuv4mpegpipe,dv,mxf,rm";
 constexpr char kUnknownTimeBase[] = "nvalid time base";  // in the program's messages
 constexpr size_t kTextBytes = 16 << 10;
+constexpr size_t kProblemBytes = 200;
 constexpr rlim_t kProgramBytes = rlim_t(1) << 30;  // more than it takes
 
 [[noreturn]] void fail_to_start(const std::string& path, const char* program, int reason) {
@@ -93,6 +94,27 @@ double duration_in(const std::string& text) {
   return hours * 3600.0 + minutes * 60 + seconds + hundredths * 0.01;
 }
 
+// Returns the last error in the program's messages, "[mov @ 0x5581] [error] moov atom not found", without its labels.
+// `input` is left out at its beginning. The text is of a stranger's file: it is short and has printable characters
+// only.
+std::string last_error_in(const std::string& text, const std::string& input) {
+  size_t start = std::string::npos;
+  for (const char* label : {"[error] ", "[fatal] ", "[panic] "}) {
+    const size_t found = text.rfind(label);
+    if (found == std::string::npos) continue;
+    const size_t after = found + std::strlen(label);
+    if (start == std::string::npos || after > start) start = after;
+  }
+  if (start == std::string::npos) return "";
+  std::string problem = text.substr(start, text.find('\n', start) - start);
+  if (problem.rfind(input + ": ", 0) == 0) problem.erase(0, input.size() + 2);
+  problem.resize(std::min(problem.size(), kProblemBytes));
+  for (char& letter : problem) {
+    if (letter < ' ' || letter > '~') letter = '?';
+  }
+  return problem;
+}
+
 }  // namespace
 
 ClipReader::ClipReader(const std::string& path, double start_s) {
@@ -114,16 +136,16 @@ bool ClipReader::start(const std::string& path, double start_s, const char* time
   ::fcntl(images_.get(), F_SETPIPE_SZ, 1 << 20);  // fewer switches between both processes; not needed
   messages_.reset(::memfd_create("maquette-ffmpeg", MFD_CLOEXEC));
   if (!messages_.is_open()) fail_to_start(path, program.c_str(), errno);
-  const std::string input = "file:" + path;  // never an address
+  input_ = "file:" + path;  // never an address
   char start[32];
   const long long start_us = std::max(0LL, std::llround(start_s * 1e6));
   std::snprintf(start, sizeof start, "%lld.%06lld", start_us / 1000000, start_us % 1000000);
   std::vector<const char*> arguments = {
-      program.c_str(),     "-nostdin", "-nostats", "-hide_banner",   "-loglevel",           "info",
+      program.c_str(),     "-nostdin", "-nostats", "-hide_banner",   "-loglevel",           "level+info",
       "-threads",          "2",        "-copyts",  "-start_at_zero", "-protocol_whitelist", "file",
       "-format_whitelist", kFormats};
   if (start_us > 0) arguments.insert(arguments.end(), {"-ss", start});
-  arguments.insert(arguments.end(), {"-i", input.c_str(), "-map", "0:V:0", "-c:v", "rawvideo", "-pix_fmt", "bgr24",
+  arguments.insert(arguments.end(), {"-i", input_.c_str(), "-map", "0:V:0", "-c:v", "rawvideo", "-pix_fmt", "bgr24",
                                      "-enc_time_base", time_base, "-f", "nut", "pipe:1", nullptr});
   const SpawnSettings settings(write_end.get(), messages_.get());
   const int error = ::posix_spawnp(&process_.id, program.c_str(), &settings.actions, &settings.attributes,
@@ -149,6 +171,7 @@ std::string ClipReader::end_of_program() {
   if (says_out_of_memory(text) || (is_limited && (!WIFEXITED(status) || WEXITSTATUS(status) != 0))) {
     throw std::bad_alloc();
   }
+  problem_ = last_error_in(text, input_);
   return text;
 }
 

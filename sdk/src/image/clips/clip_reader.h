@@ -30,6 +30,9 @@ class ClipReader {
   // decoded.
   bool read(ImageView& image, int64_t& time_ns);
 
+  // After the last frame, or without any: the last error of the program, up to 200 printable characters; "": none.
+  const std::string& problem() const { return problem_; }
+
  private:
   // Starts the program. Returns false if it does not know `time_base`.
   bool start(const std::string& path, double start_s, const char* time_base);
@@ -44,6 +47,7 @@ class ClipReader {
     pid_t id = -1;
   };
 
+  std::string input_, problem_;
   Process process_;  // ended after its pipe is closed
   UniqueFd images_, messages_;
   std::unique_ptr<NutStream> stream_;

@@ -24,7 +24,7 @@ class VideoSource : public Source {
     open(0);
     if (!clip_->has_frames()) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " cannot be opened as a video: it is truncated, damaged or no video. ",
-                  "Use a whole MP4, AVI, MOV or WebM file.");
+                  "Use a whole MP4, AVI, MOV or WebM file.", answer_of_program());
     }
     const int width = clip_->width_px();
     const int height = clip_->height_px();
@@ -76,6 +76,11 @@ class VideoSource : public Source {
     is_ended_ = false;
   }
 
+  // The reason that the decoder gives, as a sentence to append.
+  std::string answer_of_program() const {
+    return clip_->problem().empty() ? "" : concatenate(" The program ffmpeg says: ", clip_->problem());
+  }
+
   // The next frame with its number and time; false at the end.
   bool read() {
     if (is_ended_) return false;
@@ -92,7 +97,7 @@ class VideoSource : public Source {
     const int64_t frames = index_ + 1;
     if (promised_frames_ > frames + 2 + promised_frames_ / 20) {
       throw Error(MAQ_ERROR_UNREADABLE, path_, " ends after ", frames, " of ", promised_frames_,
-                  " frames: the file is truncated or damaged; copy it again.");
+                  " frames: the file is truncated or damaged; copy it again.", answer_of_program());
     }
     return false;
   }

@@ -6,7 +6,7 @@ import maquette
 import numpy as np
 
 folder, out = sys.argv[1:3]
-scene = maquette.Scene.build(folder, progress=lambda done, stage: print(f"{done:.0%} {stage}"))
+scene = maquette.Scene.build(folder, progress=maquette.ProgressLine())
 low, high = scene.bounds
 camera = maquette.PinholeCamera.looking_at(
     maquette.Intrinsics.centred(640, 480, fov_deg=60),

@@ -8,6 +8,6 @@ photo, out = sys.argv[1:3]
 seconds = float(sys.argv[3]) if len(sys.argv) > 3 else 3.0
 with maquette.HeadBuilder() as builder:
     builder.add_photo(photo)
-    head = builder.fit(seconds, progress=lambda done, stage: print(f"{done:.0%} {stage}"))
+    head = builder.fit(seconds, progress=maquette.ProgressLine())
 head.mesh().save(out)
 print(head, {name: landmark.point_m.round(3).tolist() for name, landmark in head.landmarks().items()})

@@ -36,6 +36,7 @@ from maquette.pipeline import (
     PredictionModel,
 )
 from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
+from maquette.progress import ProgressLine
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneBuilder, SceneRenderer, View
 from maquette.sources import (
     Camera,
@@ -54,9 +55,9 @@ __all__ = [
     "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
     "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
     "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",
-    "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "Recorder", "Scene",
-    "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
-    "list_source_schemes", "part_colours", "part_name", "sample",
+    "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder",
+    "Scene", "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path",
+    "list_cameras", "list_source_schemes", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

@@ -2,30 +2,58 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <maquette/maquette.hpp>
+#include <stdexcept>
 
 namespace fs = std::filesystem;
 
 namespace {
 
-std::string bundle_of(const char* variable, const char* name) {
-  if (const char* from_environment = std::getenv(variable)) {
-    if (*from_environment != '\0') return from_environment;
-  }
+// Returns where the bundle lies when it is installed with this program; "" where the system hides the program's path.
+fs::path place_of(const SystemNetworks& networks) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (error) return "";
-  const fs::path bundle = program.parent_path().parent_path() / "share/maquette/models" / name;
-  return fs::exists(bundle / "manifest.json", error) ? bundle.string() : "";
+  if (error) return {};
+  return program.parent_path().parent_path() / "share/maquette/models" / networks.bundle;
 }
 
 }  // namespace
 
-std::string default_bundle() { return bundle_of("MAQ_BUNDLE", "densepose-b-int8"); }
+std::vector<SystemNetworks> networks_of_build() {
+  std::vector<SystemNetworks> systems;
+  const auto add = [&](bool is_in, const SystemNetworks& networks) {
+    if (is_in) systems.push_back(networks);
+  };
+  add(MAQ_HAS_DENSEPOSE, kDenseposeNetworks);
+  add(MAQ_HAS_SCENES, kScenesNetworks);
+  add(MAQ_HAS_EDGES, kEdgesNetworks);
+  add(MAQ_HAS_HEADS, kHeadsNetworks);
+  add(MAQ_HAS_PREDICTION, kPredictionNetworks);
+  return systems;
+}
 
-std::string default_edges_bundle() { return bundle_of("MAQ_EDGES_BUNDLE", "edges-int8"); }
+std::string default_bundle(const SystemNetworks& networks) {
+  if (const char* from_environment = std::getenv(networks.variable)) {
+    if (*from_environment != '\0') return from_environment;
+  }
+  std::error_code error;
+  const fs::path place = place_of(networks);
+  return !place.empty() && fs::exists(place / "manifest.json", error) ? place.string() : "";
+}
 
-std::string default_heads_bundle() { return bundle_of("MAQ_HEADS_BUNDLE", "heads-int8"); }
+std::string missing_networks(const SystemNetworks& networks) {
+  return std::string("The networks of ") + networks.system + " are not installed: there is no " +
+         (place_of(networks) / "manifest.json").string() + ", and " + networks.variable + " is not set.";
+}
 
-std::string default_prediction_bundle() { return bundle_of("MAQ_PREDICTION_BUNDLE", "prediction-int8"); }
+std::string advice_on_missing(const SystemNetworks& networks) {
+  return std::string("Install them (Python: pip install 'maquette[") + networks.system +
+         "]'; otherwise the package maquette-models), or set " + networks.variable +
+         " to the folder of the bundle (in a checkout: sdk/models/" + networks.bundle + ").";
+}
 
-std::string default_scene_bundle() { return bundle_of("MAQ_SCENE_BUNDLE", "scenes-int8"); }
+std::string bundle_or_default(const SystemNetworks& networks, const std::string& given) {
+  const std::string bundle = given.empty() ? default_bundle(networks) : given;
+  if (bundle.empty()) throw std::runtime_error(missing_networks(networks) + " " + advice_on_missing(networks));
+  return bundle;
+}

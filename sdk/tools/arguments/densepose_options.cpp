@@ -35,13 +35,7 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
   command.add_flag("--no-surface", options.no_surface, "Compute only body parts: faster; U and V stay 0");
 }
 
-std::string bundle_of(const ModelOptions& options) {
-  const std::string bundle = options.bundle.empty() ? default_bundle() : options.bundle;
-  if (bundle.empty()) {
-    throw std::runtime_error("No model bundle was found; name its folder with --bundle or MAQ_BUNDLE.");
-  }
-  return bundle;
-}
+std::string bundle_of(const ModelOptions& options) { return bundle_or_default(kDenseposeNetworks, options.bundle); }
 
 maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle) {
   maq_densepose_config config = maquette::default_densepose_config();

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "arguments/bundle_argument.h"
 #include "commands/commands.h"
+#include "commands/installation.h"
 #include "print.h"
 
 namespace fs = std::filesystem;
@@ -142,9 +144,54 @@ void look_at_parts(const maquette::Context& context) {
   }
 }
 
-int look_at_cameras() {
-  print_output("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
-  const maquette::Context context;
+// True unless ONNX Runtime, which runs all networks, is not there.
+bool look_at_onnxruntime(const maquette::Context& context) {
+  try {
+    well("ONNX Runtime " + context.onnxruntime_version() + "  " + context.onnxruntime_path());
+    return true;
+  } catch (const maquette::Error& error) {
+    unwell("no network can run", error.what());
+    return false;
+  }
+}
+
+// True unless networks are damaged; a system whose networks are not installed may be one that nobody wants.
+bool look_at_networks(const maquette::Context& context) {
+  print_output("\nNetworks\n");
+  if (!look_at_onnxruntime(context)) return false;
+  bool are_whole = true;
+  for (const SystemNetworks& networks : networks_of_build()) {
+    const InstalledNetworks found = find_networks(context, networks);
+    const std::string system = networks.system;
+    if (found.path.empty()) {
+      note(missing_networks(networks));
+      print_output("        -> %s\n", advice_on_missing(networks).c_str());
+    } else if (!found.problem.empty()) {
+      unwell(system + ": " + found.problem, "install the networks again, or see " + std::string(networks.variable));
+      are_whole = false;
+    } else {
+      char size[32];
+      std::snprintf(size, sizeof size, "%.1f MB", double(found.bytes) / 1e6);
+      well(system + ": " + found.precision + ", " + size + "  " + found.path);
+    }
+  }
+  return are_whole;
+}
+
+void look_at_ffmpeg() {
+  print_output("\nClips\n");
+  const InstalledFfmpeg found = find_ffmpeg();
+  if (found.problem.empty()) {
+    well("ffmpeg " + found.version + " reads them  " + found.path);
+  } else {
+    note("clips cannot be read: " + found.problem);
+    print_output(
+        "        -> install it (Debian: apt install ffmpeg; Python: pip install 'maquette[clips]'), or set MAQ_FFMPEG "
+        "to its path\n");
+  }
+}
+
+int look_at_cameras(const maquette::Context& context) {
   maq_camera_list* made = nullptr;
   maquette::check(maq_camera_list_create(context.get(), &made));
   const maquette::Owner<maq_camera_list, maq_camera_list_destroy> list(made);
@@ -161,10 +208,20 @@ int look_at_cameras() {
   return usable > 0 ? 0 : 1;
 }
 
+int look_at_all() {
+  print_output("maquette %s (%s)\n", maq_get_sdk_version(), maq_get_build_options());
+  const maquette::Context context;
+  const bool networks_are_whole = look_at_networks(context);
+  look_at_ffmpeg();
+  const int of_cameras = look_at_cameras(context);
+  return networks_are_whole ? of_cameras : 1;
+}
+
 }  // namespace
 
 void add_doctor_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("doctor", "Find out why a camera does not work, with the remedy");
-  command->footer("Exit status: 0 if at least one camera can be used, 1 if none can.");
-  command->callback([=] { *exit_code = look_at_cameras(); });
+  CLI::App* command =
+      app.add_subcommand("doctor", "Find out why a network, a clip or a camera does not work, with the remedy");
+  command->footer("Exit status: 0 if the installed networks and at least one camera can be used, else 1.");
+  command->callback([=] { *exit_code = look_at_all(); });
 }

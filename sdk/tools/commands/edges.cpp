@@ -173,7 +173,7 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
 
 int run_edges(const EdgesOptions& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
-  const std::string bundle = edges_bundle_or_default(options.network.bundle);
+  const std::string bundle = bundle_or_default(kEdgesNetworks, options.network.bundle);
   const maquette::Context context = open_context();
   std::unique_ptr<maquette::Edges> edges;
   const auto load = [&] {

@@ -42,7 +42,7 @@ void fail_if_interrupted(const std::string& out) {
 
 int build(const BuildOptions& options) {
   catch_interrupts();
-  const std::string bundle = edges_bundle_or_default(options.network.bundle);
+  const std::string bundle = bundle_or_default(kEdgesNetworks, options.network.bundle);
   const maquette::Context context = open_context();
   const maquette::Capture capture(context, options.capture);
   const maq_capture_info info = capture.info();
@@ -64,7 +64,7 @@ int build(const BuildOptions& options) {
   require_writable(options.out);
 
   const int64_t of_views = kStepsOfView * int64_t(views.size());
-  Progress progress{ProgressBar("building", of_views + kStepsOfFusion), of_views};
+  Progress progress{ProgressBar("building", of_views + kStepsOfFusion, ProgressBar::Shown::kPercent), of_views};
   maq_edges_config of_edges = maquette::default_edges_config();
   of_edges.model.bundle_path = bundle.c_str();
   of_edges.model.threads = options.network.threads;

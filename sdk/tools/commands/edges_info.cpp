@@ -52,7 +52,7 @@ void print(const nlohmann::ordered_json& document) {
 }
 
 int show(const InfoOptions& options) {
-  const std::string bundle = edges_bundle_or_default(options.bundle);
+  const std::string bundle = bundle_or_default(kEdgesNetworks, options.bundle);
   const maquette::Context context = open_context();
   const maquette::Edges checked(context, bundle);
   const nlohmann::ordered_json document = describe(bundle);
@@ -65,15 +65,6 @@ int show(const InfoOptions& options) {
 }
 
 }  // namespace
-
-std::string edges_bundle_or_default(const std::string& given) {
-  const std::string bundle = given.empty() ? default_edges_bundle() : given;
-  if (bundle.empty()) {
-    throw std::runtime_error(
-        "No bundle of the edge network was found; set its folder with --bundle or MAQ_EDGES_BUNDLE.");
-  }
-  return bundle;
-}
 
 void add_edges_info_command(CLI::App& edges, int* exit_code) {
   auto options = std::make_shared<InfoOptions>();

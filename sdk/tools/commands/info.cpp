@@ -22,6 +22,24 @@ std::string systems() {
   return names.empty() ? "none: cameras, files and pipelines" : names;
 }
 
+// True unless a variable names a folder without networks.
+bool print_networks() {
+  bool are_there = true;
+  const char* heading = "Networks";
+  for (const SystemNetworks& networks : networks_of_build()) {
+    const std::string bundle = default_bundle(networks);
+    std::error_code error;
+    std::string text = bundle.empty() ? "not installed; `maquette doctor` says how to install them" : bundle;
+    if (!bundle.empty() && !std::filesystem::exists(std::filesystem::path(bundle) / "manifest.json", error)) {
+      text = "missing: " + bundle + " has no manifest.json; see " + networks.variable;
+      are_there = false;
+    }
+    print_output("%-14s %-10s  %s\n", heading, networks.system, text.c_str());
+    heading = "";
+  }
+  return are_there;
+}
+
 int print_info() {
   print_output("Maquette       %s (commit %s)\n", maq_get_sdk_version(), maq_get_git_commit());
   print_output("Build          %s\n", maq_get_build_options());
@@ -35,26 +53,13 @@ int print_info() {
     exit_code = 1;
   }
   print_output("Systems        %s\n", systems().c_str());
-#if MAQ_HAS_DENSEPOSE
-  const std::string bundle = default_bundle();
-  std::error_code error;
-  if (bundle.empty()) {
-    print_output("Model bundle   missing: none was found; give one with --bundle or MAQ_BUNDLE\n");
-    exit_code = 1;
-  } else if (!std::filesystem::exists(std::filesystem::path(bundle) / "manifest.json", error)) {
-    print_output("Model bundle   missing: %s has no manifest.json; see MAQ_BUNDLE\n", bundle.c_str());
-    exit_code = 1;
-  } else {
-    print_output("Model bundle   %s\n", bundle.c_str());
-  }
-#endif
-  return exit_code;
+  return print_networks() ? exit_code : 1;
 }
 
 }  // namespace
 
 void add_info_command(CLI::App& app, int* exit_code) {
   CLI::App* command = app.add_subcommand(
-      "info", "Print the versions, the systems in this build, and the paths of ONNX Runtime and the model bundle");
+      "info", "Print the versions, the systems in this build, and the paths of ONNX Runtime and the networks");
   command->callback([=] { *exit_code = print_info(); });
 }

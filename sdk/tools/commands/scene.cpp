@@ -41,14 +41,6 @@ int show(const InfoOptions& options) {
 
 }  // namespace
 
-std::string scene_bundle_or_default(const std::string& given) {
-  const std::string bundle = given.empty() ? default_scene_bundle() : given;
-  if (bundle.empty()) {
-    throw std::runtime_error("No scene bundle was found; name its folder with --bundle or MAQ_SCENE_BUNDLE.");
-  }
-  return bundle;
-}
-
 nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes) {
   nlohmann::ordered_json document;
   document["points"] = info.point_count;

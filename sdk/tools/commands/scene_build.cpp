@@ -61,13 +61,13 @@ int build(const BuildOptions& options) {
     const maq_capture_drop drop = capture.drop(i);
     print_error("  left out: %" PRIu64 " %s\n", drop.count, drop.reason);
   }
-  const std::string networks = scene_bundle_or_default(options.bundle);
+  const std::string networks = bundle_or_default(kScenesNetworks, options.bundle);
   for (const std::string* path : {&options.out, &options.ply}) {
     make_folder_of(*path);
     require_writable(*path);
   }
   require_writable(options.json);
-  ProgressBar progress("building", kPermille);
+  ProgressBar progress("building", kPermille, ProgressBar::Shown::kPercent);
   maq_scene_build_config config = maquette::default_scene_build_config();
   config.model.bundle_path = networks.c_str();
   config.model.threads = options.threads;

@@ -12,7 +12,5 @@ class App;
 void add_scene_build_command(CLI::App& scene, int* exit_code);
 void add_scene_render_command(CLI::App& scene, int* exit_code);
 
-// Returns `given`, or the default bundle of scene networks. Throws std::runtime_error if there is none.
-std::string scene_bundle_or_default(const std::string& given);
 // Describes a scene file.
 nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes);

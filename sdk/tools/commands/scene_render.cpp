@@ -48,7 +48,7 @@ std::optional<PictureSize> size_of(const std::string& text) {
 
 maquette::SceneRenderer make_renderer(const maquette::Context& context, const maquette::Scene& scene,
                                       const RenderOptions& options) {
-  const std::string networks = scene_bundle_or_default(options.bundle);
+  const std::string networks = bundle_or_default(kScenesNetworks, options.bundle);
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
   config.model.bundle_path = networks.c_str();
   config.model.threads = options.threads;

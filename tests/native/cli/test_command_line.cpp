@@ -318,6 +318,51 @@ TEST_F(CommandLine, TheDoctorSaysWhatToDo) {
   }
 }
 
+TEST_F(CommandLine, TheDoctorReadsTheNetworksOfEachSystemAndTellsTheirPrecisionAndSize) {
+  environment_ = "MAQ_SCENE_BUNDLE='" MAQ_TEST_DATA "/tiny_scene/bundle'";
+  const Outcome result = run("doctor");
+  for (const char* text : {"ok    densepose: fp32, 0.", "tiny_bundle\n", "ok    scenes: ", "tiny_scene/bundle\n",
+                           "ok    edges: int8, 1.4 MB  ", "/models/edges-int8\n", "ok    heads: int8, 4.0 MB  ",
+                           "ok    prediction: int8, 7.7 MB  "}) {
+    EXPECT_NE(result.out.find(text), std::string::npos) << text << result.out;
+  }
+}
+
+TEST_F(CommandLine, TheDoctorTellsDamagedNetworksAndItsExitCodeIsOne) {
+  const BundleCopy damaged;
+  damaged.flip_byte("trunk.onnx");
+  bundle_ = damaged.path();
+  const Outcome result = run("doctor");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.out.find("BAD   densepose: "), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("trunk.onnx"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("-> install the networks again, or see MAQ_BUNDLE"), std::string::npos) << result.out;
+}
+
+TEST_F(CommandLine, TheDoctorFindsTheProgramThatReadsClipsOrSaysHowToGetIt) {
+  const std::string program = folder_.file("decoder's");
+  write_text(program, "#!/bin/sh\necho 'ffmpeg version 9.1-x Copyright (c) the developers'\necho more\n");
+  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+  environment_ = "MAQ_FFMPEG=\"" + program + "\"";
+  Outcome result = run("doctor");
+  EXPECT_NE(result.out.find("ffmpeg 9.1-x reads them  " + program), std::string::npos) << result.out;
+
+  environment_ = "MAQ_FFMPEG=/no/such";
+  result = run("doctor");
+  EXPECT_NE(result.out.find("MAQ_FFMPEG names /no/such, which is no program"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("apt install ffmpeg"), std::string::npos) << result.out;
+
+  write_text(program, "#!/bin/sh\necho hello\n");
+  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+  environment_ = "MAQ_FFMPEG=\"" + program + "\"";
+  result = run("doctor");
+  EXPECT_NE(result.out.find("does not tell its version"), std::string::npos) << result.out;
+
+  environment_ = "PATH=" + folder_.path().string();
+  result = run("doctor");
+  EXPECT_NE(result.out.find("the program ffmpeg is not in the PATH"), std::string::npos) << result.out;
+}
+
 TEST_F(CommandLine, AWordThatIsNoCommandIsNamed) {
   for (const auto& [arguments, text] :
        {std::pair("frobnicate", "\"frobnicate\" is not a command; `maquette --help`"),
@@ -352,14 +397,16 @@ TEST_F(CommandLine, InfoTellsOfABundleThatIsNotThere) {
   bundle_ = "nowhere";
   const Outcome info = run("info");
   EXPECT_EQ(info.exit_code, 1);
-  EXPECT_NE(info.out.find("Model bundle   missing: nowhere has no manifest.json"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("densepose   missing: nowhere has no manifest.json; see MAQ_BUNDLE"), std::string::npos)
+      << info.out;
 }
 
 TEST_F(CommandLine, InfoAndSourcesSayWhatThereIs) {
   const Outcome info = run("info");
   EXPECT_EQ(info.exit_code, 0) << info.err;
   EXPECT_NE(info.out.find("ONNX Runtime   1."), std::string::npos) << info.out;
-  EXPECT_NE(info.out.find("tiny_bundle"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("Networks       densepose   " MAQ_TEST_DATA "/tiny_bundle\n"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("heads       " MAQ_TEST_MODELS "/heads-int8\n"), std::string::npos) << info.out;
   const Outcome sources = run("sources");
   for (const char* text : {"image:photo.jpg", "video:clip.mp4", "stub:people"}) {
     EXPECT_NE(sources.out.find(text), std::string::npos) << text;

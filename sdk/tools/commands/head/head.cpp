@@ -135,7 +135,7 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
     return;
   }
 #if MAQ_HAS_DENSEPOSE
-  const std::string bundle = options.densepose.empty() ? default_bundle() : options.densepose;
+  const std::string bundle = options.densepose.empty() ? default_bundle(kDenseposeNetworks) : options.densepose;
   if (bundle.empty()) {
     print_error("No bundle of dense pose was found, so the head is detected without it; see --densepose, --box.\n");
     return;
@@ -326,7 +326,7 @@ struct FitProgress {
 };
 
 maquette::Head fit_head(const HeadOptions& options, maquette::HeadBuilder& builder, FitProgress& progress) {
-  ProgressBar bar("fitting", kHeadPermille);
+  ProgressBar bar("fitting", kHeadPermille, ProgressBar::Shown::kPercent);
   progress.bar = &bar;
   try {
     maquette::Head head = builder.fit(options.seconds);
@@ -400,10 +400,7 @@ maq_head_builder_config builder_config(const HeadOptions& options, const std::st
 
 int run_head(const HeadOptions& options) {
   catch_interrupts();
-  const std::string bundle = options.network.bundle.empty() ? default_heads_bundle() : options.network.bundle;
-  if (bundle.empty()) {
-    throw std::runtime_error("No bundle of heads was found; name its folder with --bundle or MAQ_HEADS_BUNDLE.");
-  }
+  const std::string bundle = bundle_or_default(kHeadsNetworks, options.network.bundle);
   const maquette::Context context = open_context();
   std::vector<Photo> photos;
   for (const std::string& text : options.photos) {

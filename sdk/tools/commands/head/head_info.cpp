@@ -24,7 +24,7 @@ struct TemplateFacts {
 };
 
 TemplateFacts template_facts(const maquette::Head& head, const std::string& named) {
-  const std::string bundle = named.empty() ? default_heads_bundle() : named;
+  const std::string bundle = named.empty() ? default_bundle(kHeadsNetworks) : named;
   maq_head_mesh_config config = maquette::default_head_mesh_config();
   config.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
   if (!bundle.empty()) config.model.bundle_path = bundle.c_str();

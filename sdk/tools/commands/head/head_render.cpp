@@ -80,7 +80,8 @@ int render_head(const HeadRenderOptions& given) {
   maq_head_mesh_config mesh = maquette::default_head_mesh_config();
   mesh.cell_m = given.cell_mm * 1e-3;
   mesh.topology = topology_of(given.topology);
-  const std::string bundle = given.bundle.empty() ? default_heads_bundle() : given.bundle;
+  const std::string bundle =
+      mesh.topology == MAQ_HEAD_TOPOLOGY_TEMPLATE ? bundle_or_default(kHeadsNetworks, given.bundle) : "";
   if (!bundle.empty()) mesh.model.bundle_path = bundle.c_str();
   mesh.model.threads = view.threads;
   view.with_alpha = !given.no_alpha;

@@ -123,9 +123,9 @@ std::optional<maquette::Clip> open_clip(const maquette::Context& context, const 
 }
 
 maquette::Novelty make_novelty(const maquette::Context& context, const NoveltyOptions& options) {
-  const std::string bundle = options.bundle.empty() ? default_prediction_bundle() : options.bundle;
+  const std::string bundle = bundle_or_default(kPredictionNetworks, options.bundle);
   maq_novelty_config config = maquette::default_novelty_config();
-  if (!bundle.empty()) config.model.bundle_path = bundle.c_str();
+  config.model.bundle_path = bundle.c_str();
   config.model.threads = options.threads;
   config.event_ratio = float(options.threshold);
   return maquette::Novelty(context, config);

@@ -37,6 +37,10 @@ struct PredictOptions {
   int threads = 0;
   std::string out;
   SampleOptions sampling;
+
+  bool needs_networks() const {
+    return method == MAQ_PREDICTOR_REFINED || method == MAQ_PREDICTOR_SAMPLED || sampling.samples > 0;
+  }
 };
 
 constexpr int64_t kDefaultFrom = 30;
@@ -353,7 +357,7 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4");
   command->callback([=] {
     require_sampling(*command, *options);
-    if (options->bundle.empty()) options->bundle = default_prediction_bundle();
+    if (options->needs_networks()) options->bundle = bundle_or_default(kPredictionNetworks, options->bundle);
     *exit_code = predict(*options);
   });
 }

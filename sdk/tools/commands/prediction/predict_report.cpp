@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "output/output_file.h"
 #include "print.h"
 
 namespace {

@@ -10,6 +10,7 @@ int main(int argc, char** argv) try {
   const bool is_hint = argc > 3 && std::string(argv[3]) == "detectron2";
   const maquette::Context context;
   const auto photo = maquette::Source(context, argv[1]).next();
+  if (!photo) throw std::runtime_error(std::string(argv[1]) + " has no image.");
   const auto people = maquette::DensePose(context).run(*photo);
 
   maq_densepose_drawing drawing;

@@ -68,6 +68,20 @@ if(WAY STREQUAL "find_package")
   if(NOT output MATCHES "^1 people, [0-9]+ ms\n")
     message(FATAL_ERROR "live printed ${output}")
   endif()
+  # A missing and a damaged input: a sentence and an exit code in each example.
+  file(WRITE "${WORK_DIR}/text.jpg" "no image")
+  foreach(name missing text)
+    foreach(words "count_people;image:${name}.jpg" "draw_people;image:${name}.jpg;o.png" "predict;image:${name}.jpg;o.png"
+        "box_size;image:${name}.jpg?depth_unit=0.001&fov=60" "head;image:${name}.jpg;o.glb" "live;image:${name}.jpg"
+        "novelty;image:${name}.jpg" "new_view;${scene}/bundle;${name}.jpg;o.png")
+      list(POP_FRONT words program)
+      execute_process(COMMAND "build/${program}" ${words} WORKING_DIRECTORY "${WORK_DIR}" RESULT_VARIABLE result
+        ERROR_VARIABLE error OUTPUT_QUIET)
+      if(NOT result EQUAL 1 OR NOT error MATCHES "^[^\n]*${name}.jpg [^\n]*[.]\n$")
+        message(FATAL_ERROR "${program} ${words}: exit code ${result}, ${error}")
+      endif()
+    endforeach()
+  endforeach()
 else()
   set(ENV{PKG_CONFIG_PATH} "${moved}/${LIBDIR}/pkgconfig")
   run(pkg-config --cflags --libs "maquette >= 0.2")

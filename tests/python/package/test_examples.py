@@ -1,7 +1,10 @@
 """The examples in Python and the notebook run from top to bottom."""
 
 import json
+import os
+import re
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,6 +21,22 @@ def run(name: str, monkeypatch, *arguments: object) -> None:
     path = EXAMPLES / f"python/{name}.py"
     monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
     runpy.run_path(str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [("box_size", ["60"]), ("live", []), ("new_view", ["o.png"]), ("novelty", []), ("photo_to_head", ["o.glb"]),
+     ("photo_to_hint", ["o.png"]), ("photo_to_iuv", ["o"]), ("record", ["o.maqrec"])],
+)  # fmt: skip
+def test_an_example_ends_with_the_sentence_about_a_wrong_input_and_exit_code_1(name, more, tmp_path):
+    (tmp_path / "text.jpg").write_text("no image")
+    for file in ("missing.jpg", "text.jpg"):
+        command = [sys.executable, EXAMPLES / f"python/{name}.py", file, *more]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "python")}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert done.returncode == 1, done.stderr
+        told = done.stderr.splitlines()
+        assert re.match(rf"(\w+\.)*(MaquetteError|FileNotFoundError): .*{file}", told[-1]), done.stderr
 
 
 @pytest.mark.parametrize(

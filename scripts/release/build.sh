@@ -4,7 +4,7 @@
 #   scripts/release/build.sh
 #
 #   *.whl                        Python packages                        (build/wheel)
-#   maquette-VERSION-*.tar.gz    library, headers, programs, networks   (build/wheel-MACHINE)
+#   maquette-VERSION-*.tar.gz    library, headers, programs, networks, examples  (build/wheel-MACHINE)
 #   maquette-models-*.tar.gz     the networks of each system
 #   *.deb                        Debian packages                        (deb.sh)
 #   maven/                       Maven repository with the AAR          (build/android)
@@ -44,6 +44,7 @@ pack() {
         [ "$component" != runtime ] || cp /usr/share/doc/libstdc++6/copyright "$work/$name/share/maquette/licenses/libstdc++.txt"
     done
     cp LICENSE "$work/$name/share/maquette/licenses/"
+    case " ${*:3} " in *" development "*) git archive HEAD README.md examples | tar -x -C "$work/$name" ;; esac
     "$python" scripts/release/sbom.py --name "${name%-"$version"*}" --root "$work/$name" \
         --out "$work/$name/share/maquette/sbom/${name%-"$version"*}.cdx.json"
     tar --create --directory "$work" --sort=name --mtime="@$epoch" --owner=0 --group=0 --numeric-owner \

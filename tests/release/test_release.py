@@ -128,11 +128,45 @@ def test_the_debian_packages_are_clean():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_program_of_the_tarball_finds_people_in_a_photo(tmp_path):
-    (tarball,) = DIST.glob(f"maquette-{VERSION}-linux-{MACHINE}.tar.gz")
-    folder = unpack(tarball, tmp_path)
+@pytest.fixture
+def tarball(tmp_path) -> Path:
+    (packed,) = DIST.glob(f"maquette-{VERSION}-linux-{MACHINE}.tar.gz")
+    (tmp_path / "unpacked").mkdir()
+    return unpack(packed, tmp_path / "unpacked")
+
+
+def test_pkg_config_links_a_program_to_the_tarball_by_the_commands_of_the_guide(tarball, tmp_path):
+    guide = (ROOT / "docs/guide/link.md").read_text().split("## From the tarball of a release")[1]
+    commands = [line.strip() for line in guide.split("\n## ")[0].splitlines() if line.startswith("    ")]
+    commands[0] = f"ln -s {tarball} $(basename {commands[0].split()[-1]} .tar.gz)"  # unpacked already
+    done = subprocess.run(["sh", "-ec", "\n".join(commands)], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    photo = f"image:{ROOT / 'tests/media/photo.jpg'}"
+    done = subprocess.run([tmp_path / "people", photo], env={}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("person 0.")
+
+
+def test_cmake_finds_the_tarball_and_builds_its_examples(tarball, tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(app CXX)\nfind_package(maquette REQUIRED)\n"
+        f"add_executable(app {tarball / 'examples/cpp/count_people.cpp'})\n"
+        "target_link_libraries(app PRIVATE maquette::maquette)\n"
+    )
+    for command in (
+        ["cmake", "-S", ".", "-B", "build", f"-DCMAKE_PREFIX_PATH={tarball}"],
+        ["cmake", "--build", "build"],
+    ):
+        subprocess.run(command, cwd=tmp_path, check=True)
+    source = "stub:pattern?frames=1&size=320x256"
+    done = subprocess.run([tmp_path / "build/app", source], env={}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "0 people\n"), done.stderr
+    assert (tarball / "README.md").exists()
+
+
+def test_the_program_of_the_tarball_finds_people_in_a_photo(tarball, tmp_path):
     photo = ROOT / "tests/media/photo.jpg"
-    command = [folder / "bin/maquette", "densepose", photo, "--out", tmp_path / "results"]
+    command = [tarball / "bin/maquette", "densepose", photo, "--out", tmp_path / "results"]
     done = subprocess.run(command, env={"HOME": str(tmp_path)}, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert list((tmp_path / "results").iterdir())

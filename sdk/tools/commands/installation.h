@@ -1,4 +1,4 @@
-// What is installed beside the library: networks, and the program that reads clips.
+// Finds the networks that are installed beside the library, and the program that reads clips.
 #pragma once
 
 #include <cstdint>

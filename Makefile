@@ -123,6 +123,11 @@ test-wheel:  ## the wheels of `make wheel` in bare Debian 11, 12 and 13, beside 
 	@scripts/make-venv.sh
 	@$(PYTHON) -m tests.wheel
 
+.PHONY: bench-data
+bench-data: packages-test  ## data that `make bench` measures on: photographs, rendered people, places, solids (about 80 minutes, once)
+	@scripts/make-venv.sh train,teachers,solids,captures,clips
+	@.venv/bin/python -m benchmarks.data
+
 .PHONY: bench
 bench: build packages-test  ## speed, size and error against benchmarks/targets.toml; a report in build/benchmarks
 	@scripts/make-venv.sh train,bench

@@ -44,14 +44,12 @@ SETS = (
     Set("teachers/labels/*.npz",
         ("export.teachers --photos .data/photos/photo .data/photos/test .data/photos/views",), 5, "person_sizes"),
     Set("teachers/backbone.pt", ("export.teachers.backbone",), 0.2, "scenes: distance by features"),
+    Set("clips/pushing/val/*.npz", ("export.clips.dataset pushing --split val --clips 16",), 2, "prediction"),
     Set("places/test/*/transforms.json",
         ("export.places.assets", "export.places.dataset --split test --scenes 8"), 15, "scenes"),
     Set("places/real/house/transforms.json", ("export.captures fetch",), 5, "scenes, edges of a real box"),
-    Set("places/train/*/transforms.json", ("export.places.dataset --split train --scenes 40 --small",), 15,
-        "scenes: range of features of the float networks"),
     Set("bundles/scenes-fp32/manifest.json",
-        ("export.scenes.export_onnx --checkpoint export/weights/scenes.pt --places .data/places/train",), 0.5,
-        "scenes: error of int8"),
+        ("export.scenes.export_onnx --checkpoint export/weights/scenes.pt",), 0.5, "scenes: error of int8"),
     Set("solids/val/solids-*.npz", ("export.solids.dataset val --whole --count 40 --out .data/solids/val",), 4,
         "edges"),
     Set("solids/test/solids-*.npz", ("export.solids.dataset test --whole --count 200 --out .data/solids/test",), 20,
@@ -59,7 +57,6 @@ SETS = (
     Set("solids/real/solids-*.npz", ("export.depth_frames fetch --out .data/solids/real",), 2, "edges: scans of toys"),
     Set("solids/kicad/solids-*.npz", ("benchmarks.edges.cad_parts --out .data/solids/kicad",), 10,
         "edges: real CAD parts"),
-    Set("clips/pushing/val/*.npz", ("export.clips.dataset pushing --split val --clips 16",), 2, "prediction"),
 )  # fmt: skip
 
 

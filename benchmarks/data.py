@@ -3,66 +3,78 @@
     python -m benchmarks.data          makes missing data below .data; `make bench-data` installs what this needs
     python -m benchmarks.data --list   says what exists, what is missing, and how long it takes
 
-Nothing here is training data of a shipped network. Data that exists is kept; delete its folder to make it again.
-Exit status: 0 if all data exists, 1 if a command failed (the others still run).
+Nothing here is training data of a shipped network. Commands that succeeded are noted in `.data/bench-data.json` and not
+run again. Exit status: 0 if all data exists, 1 if a command failed (the others still run).
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import subprocess
 import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
-DATA = Path(".data")
+DATA, DONE = Path(".data"), "bench-data.json"
 
 
 @dataclass(frozen=True)
 class Set:
-    """Data below `.data`. made: a pattern that its last command writes. commands: module and arguments.
+    """Data below `.data`. folder: where it lies. commands: module and arguments; each continues where it was stopped.
     minutes: time on two cores. use: the sections that read it."""
 
-    made: str
+    folder: str
     commands: tuple[str, ...]
     minutes: float
     use: str
 
-    def exists(self, folder: Path = DATA) -> bool:
-        return any(folder.glob(self.made))
-
 
 SETS = (
-    Set("photos/*/*.jpg", ("export.photos fetch",), 4, "all"),
-    Set("assets/*", ("export.people.assets",), 1, "all rendered people"),
-    Set("people/test/shard-*.npz", ("export.people.dataset --split test --images 150 --per-shard 150",), 1,
+    Set("photos", ("export.photos fetch",), 4, "all"),
+    Set("assets", ("export.people.assets",), 1, "all rendered people"),
+    Set("people/test", ("export.people.dataset --split test --images 150 --per-shard 150",), 1,
         "sweep, agreement"),
-    Set("people-wide/test/shard-*.npz",
+    Set("people-wide/test",
         ("export.people.dataset --split test --images 100 --per-shard 150 --variety wide --out .data/people-wide",), 1,
         "person_sizes"),
-    Set("teachers/labels/*.npz",
+    Set("teachers/labels",
         ("export.teachers --photos .data/photos/photo .data/photos/test .data/photos/views",), 5, "person_sizes"),
     Set("teachers/backbone.pt", ("export.teachers.backbone",), 0.2, "scenes: distance by features"),
-    Set("clips/pushing/val/*.npz", ("export.clips.dataset pushing --split val --clips 16",), 2, "prediction"),
-    Set("places/test/*/transforms.json",
+    Set("clips/pushing/val", ("export.clips.dataset pushing --split val --clips 16",), 2, "prediction"),
+    Set("places/test",
         ("export.places.assets", "export.places.dataset --split test --scenes 8"), 15, "scenes"),
-    Set("places/real/house/transforms.json", ("export.captures fetch",), 5, "scenes, edges of a real box"),
-    Set("bundles/scenes-fp32/manifest.json",
+    Set("places/real", ("export.captures fetch",), 5, "scenes, edges of a real box"),
+    Set("bundles/scenes-fp32",
         ("export.scenes.export_onnx --checkpoint export/weights/scenes.pt",), 0.5, "scenes: error of int8"),
-    Set("solids/val/solids-*.npz", ("export.solids.dataset val --whole --count 40 --out .data/solids/val",), 4,
+    Set("solids/val", ("export.solids.dataset val --whole --count 40 --out .data/solids/val",), 4,
         "edges"),
-    Set("solids/test/solids-*.npz", ("export.solids.dataset test --whole --count 200 --out .data/solids/test",), 20,
+    Set("solids/test", ("export.solids.dataset test --whole --count 200 --out .data/solids/test",), 20,
         "edges"),
-    Set("solids/real/solids-*.npz", ("export.depth_frames fetch --out .data/solids/real",), 2, "edges: scans of toys"),
-    Set("solids/kicad/solids-*.npz", ("benchmarks.edges.cad_parts --out .data/solids/kicad",), 10,
+    Set("solids/real", ("export.depth_frames fetch --out .data/solids/real",), 2, "edges: scans of toys"),
+    Set("solids/kicad", ("benchmarks.edges.cad_parts --out .data/solids/kicad",), 10,
         "edges: real CAD parts"),
 )  # fmt: skip
 
 
-def make(one: Set) -> bool:
-    """Runs the commands of a set. Returns whether all of them succeeded."""
-    return all(subprocess.run([sys.executable, "-m", *command.split()]).returncode == 0 for command in one.commands)
+def read_done(data: Path = DATA) -> list[str]:
+    """Returns the commands that succeeded before."""
+    path = data / DONE
+    return json.loads(path.read_text()) if path.exists() else []
+
+
+def make(commands: tuple[str, ...], data: Path = DATA) -> bool:
+    """Runs those commands that did not succeed before, in order. Returns whether all of them succeeded."""
+    for command in commands:
+        done = read_done(data)
+        if command in done:
+            continue
+        if subprocess.run([sys.executable, "-m", *command.split()]).returncode:
+            return False
+        data.mkdir(parents=True, exist_ok=True)
+        (data / DONE).write_text(json.dumps([*done, command], indent=1) + "\n")
+    return True
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -73,13 +85,14 @@ def main(argv: list[str] | None = None) -> int:
     options = parser.parse_args(argv)
     failed = []
     for number, one in enumerate(SETS, 1):
-        state = "exists" if one.exists() else f"missing, some {one.minutes:g} minutes"
-        print(f"[{number}/{len(SETS)}] {one.made}: {state} ({one.use})", flush=True)
-        if options.list or one.exists():
+        is_done = set(one.commands) <= set(read_done())
+        state = "exists" if is_done else f"missing, {one.minutes:g} minutes"
+        print(f"[{number}/{len(SETS)}] {DATA / one.folder}: {state} ({one.use})", flush=True)
+        if options.list or is_done:
             continue
         start = time.monotonic()
-        if not make(one):
-            failed.append(one.made)
+        if not make(one.commands):
+            failed.append(one.folder)
         print(f"    {time.monotonic() - start:.0f} s", flush=True)
     if failed:
         print(f"Not made: {', '.join(failed)}. The benchmark leaves their figures out.", file=sys.stderr)

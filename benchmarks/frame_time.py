@@ -65,7 +65,6 @@ def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, fl
     main = bench([people(k) for k in PEOPLE], *runs, "--threads", str(threads))
     sizes = bench([people(1, size) for size in SIZES], *runs, "--threads", str(threads))
     single = bench([people(k) for k in (0, 1, 4)], *runs, "--threads", "1")
-    asleep = bench([people(1)], *runs, "--threads", str(threads), "--no-spin")
     starts = [
         bench([people(1)], "--runs", "1", "--seconds", "0", "--warm-up", "0", "--threads", str(threads))
         for _ in tqdm(range(3 if quick else STARTS), desc="starts", unit="start", disable=None)
@@ -80,7 +79,7 @@ def measure(folder: Path, threads: int, quick: bool) -> tuple[dict, dict[str, fl
         "first_result_ms": statistics.median(start["start_to_first_result_ms"] for start in starts),
     }
     metrics = {name: round(value, 2) for name, value in metrics.items()}
-    document = {"people": main, "sizes": sizes, "one_thread": single, "no_spin": asleep,
+    document = {"people": main, "sizes": sizes, "one_thread": single,
                 "starts_ms": [start["start_to_first_result_ms"] for start in starts],
                 "create_ms": statistics.median(start["create_ms"] for start in starts)}  # fmt: skip
     return document, metrics, main["machine"]

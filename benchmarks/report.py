@@ -165,10 +165,10 @@ def sweep_section(sweep: list[dict]) -> Section:
 
 def frames_section(frames: dict) -> Section:
     rows = [["case", "people found", "p50 ms", "p90", "p99", "frames a second", "CPU ms"]]
-    for name in ("people", "sizes", "one_thread", "no_spin"):
+    for name in ("people", "sizes", "one_thread"):
         for case in frames[name]["cases"]:
             ms = case["ms"]["frame"]
-            label = case["source"] + {"one_thread": ", 1 thread", "no_spin": ", threads sleep"}.get(name, "")
+            label = case["source"] + (", 1 thread" if name == "one_thread" else "")
             rows.append([label, f"{case['people']:.1f}", *(f"{ms[p]:.1f}" for p in ("p50", "p90", "p99")),
                          f"{case['fps']:.0f}", f"{case['cpu_ms']:.1f}"])  # fmt: skip
     return "Time of a frame", [

@@ -87,7 +87,6 @@ int main(int argc, char** argv) try {
   const maquette::Context context;
   maq_densepose_config config = maquette::default_densepose_config();
   config.model.bundle_path = argv[1];
-  config.model.spinning = MAQ_SPINNING_OFF;  // as the demo
   Events events;
   maquette::LiveDensePose* told = nullptr;  // the pipeline starts when it is opened
   maquette::LiveDensePose live(

@@ -31,8 +31,6 @@ int main(int argc, char** argv) try {
   options.texture = shared_file("MAQ_DEMO_OUTFIT", "demo/outfit.png");
   if (!fs::exists(options.texture)) options.texture.clear();
   options.out = fs::current_path().string();
-  // A thread that stays awake takes a core from the window.
-  options.model.model.spinning = options.edges_model.edges.model.spinning = MAQ_SPINNING_OFF;
   bool part_only = false, skip_planes = false;
   double ahead_ms = options.prediction.ahead_s * 1e3;
   std::string method = kMethodNames[0];

@@ -59,9 +59,6 @@ class ModelSettings(TypedDict, total=False):
     threads: int
     """1 to 64; 0: the machine's large cores, at most 4; MAQ_THREADS_MEASURED: measured."""
 
-    spinning: Literal["default", "on", "off"]
-    """Default "default"."""
-
     provider: Literal["cpu", "xnnpack", "nnapi"]
     """Default "cpu". The CPU replaces a provider that is missing or that takes less than half of the network; the log
     says why."""

@@ -141,7 +141,6 @@ void LiveHead::fit_photo(const Request& request) {
   if (!builder_) {
     maq_head_builder_config config = default_head_builder_config();
     config.model.bundle_path = bundle_path_.c_str(), config.model.threads = threads_;
-    config.model.spinning = MAQ_SPINNING_OFF;  // a thread that stays awake takes a core from the window
     config.texture_px = kTexture_px;
     config.progress_callback = tell_progress;
     config.progress_user_data = this;

@@ -280,7 +280,6 @@ int run_bench(const Options& options) {
                           {"crops", options.model.crops},
                           {"crop_size", options.model.crop_px},
                           {"surface", !options.model.no_surface},
-                          {"spin", !options.model.no_spin},
                           {"provider", options.model.provider},
                           {"warm_up", options.warm_up},
                           {"runs", options.runs},

@@ -272,7 +272,6 @@ void LivePrediction::switch_novelty(const PredictionChoice& choice) {
   if (!choice.scores_novelty) return;
   maq_novelty_config config = default_novelty_config();
   if (!choice.bundle.empty()) config.model.bundle_path = choice.bundle.c_str();
-  config.model.spinning = MAQ_SPINNING_OFF;
   try {
     novelty_.emplace(context_, config);
   } catch (const Error& error) {

@@ -66,13 +66,6 @@ typedef enum maq_provider {
   MAQ_PROVIDER_NNAPI = 2    /* accelerators of an Android device; may be slower than the CPU: measure it */
 } maq_provider;
 
-/* Whether idle threads of a network spin, waiting for the next layer. Values never change meaning. */
-typedef enum maq_spinning {
-  MAQ_SPINNING_DEFAULT = 0, /* the SDK's choice: MAQ_SPINNING_ON in this version */
-  MAQ_SPINNING_ON = 1,      /* idle threads spin for a while: faster */
-  MAQ_SPINNING_OFF = 2      /* idle threads sleep: saves energy */
-} maq_spinning;
-
 /* A file in the app's memory, for systems without a file system (phones, browsers). The call that takes it copies it:
  * name and data may be freed when the call returns. */
 typedef struct maq_memory_file {
@@ -86,7 +79,6 @@ typedef struct maq_memory_file {
  * neither is set, the bundle installed with the library is used. Paths and files are copied. */
 typedef struct maq_model_options {
   int32_t threads;       /* 1 to 64; 0: the machine's large cores, at most 4; MAQ_THREADS_MEASURED: measured */
-  maq_spinning spinning; /* default MAQ_SPINNING_DEFAULT */
   maq_provider provider; /* default MAQ_PROVIDER_CPU. The CPU replaces a provider that is missing or that takes less
                             than half of the network; the log says why. */
   uint32_t bundle_file_count;          /* default 0 */

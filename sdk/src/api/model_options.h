@@ -17,11 +17,7 @@ inline void require_model_options(const std::string& name, const maq_model_optio
   } else {
     require_range(name + ".threads", options.threads, 0, 64);
   }
-  require_range(name + ".spinning", number_in(options.spinning), int32_t(MAQ_SPINNING_DEFAULT),
-                int32_t(MAQ_SPINNING_OFF));
   require_provider(name + ".provider", options.provider);
 }
-
-inline bool may_spin(const maq_model_options& options) { return options.spinning != MAQ_SPINNING_OFF; }
 
 }  // namespace maq

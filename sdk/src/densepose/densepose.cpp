@@ -59,12 +59,13 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       cancel_(std::make_unique<RunCancel>(runtime)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
                bundle.path_of(spec_.surface_file)) {
-  SessionSettings on_provider{settings_.threads, settings_.spin};
+  SessionSettings on_provider;
+  on_provider.threads = settings_.threads;
   on_provider.provider = available_provider(*runtime, settings_.provider);
   if (measures_threads_) {
     settings_.threads = Trunk::measured_threads(runtime, bundle, spec_, settings_.long_side_px, on_provider);
   }
-  const DensePoseNetworks networks(std::move(runtime), bundle, settings_.threads, settings_.spin, on_provider.provider);
+  const DensePoseNetworks networks(std::move(runtime), bundle, settings_.threads, on_provider.provider);
   detector_ = std::make_unique<PersonDetector>(networks, spec_, settings_);
   const int channels = detector_->trunk().channels();
   mapper_ = std::make_unique<SurfaceMapper>(networks, spec_, "dense_head", spec_.charts_file, channels);

@@ -15,7 +15,8 @@ namespace {
 constexpr int kDepthRowsOfTask = 32;
 
 SessionSettings session_settings(const OnnxRuntimeLibrary& runtime, const EdgesSettings& settings) {
-  SessionSettings made{settings.threads, settings.spin};
+  SessionSettings made;
+  made.threads = settings.threads;
   made.provider = available_provider(runtime, settings.provider);
   return made;
 }

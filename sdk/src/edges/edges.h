@@ -17,7 +17,6 @@ namespace maq {
 // The settings of maq_edges_config, which explains them.
 struct EdgesSettings {
   int threads = 1;  // or MAQ_THREADS_MEASURED
-  bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
   bool skips_planes = false;
   int average_frames = 1;

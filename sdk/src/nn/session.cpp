@@ -11,6 +11,11 @@
 namespace maq {
 namespace {
 
+// How long an idle thread spins for the next layer before it sleeps, in microseconds. Layers follow each other within
+// this time. Measured with dense pose, 2 threads on 2 cores: ONNX Runtime's default of 1,000 has 116 frames a second on
+// an idle machine and 46 beside a busy process, no spinning 92 and 78, this 112 and 76.
+constexpr char kSpin_us[] = "20";
+
 void ORT_API_CALL forward_to_log(void* log, OrtLoggingLevel severity, const char*, const char*, const char*,
                                  const char* message) {
   const maq_log_level level = severity >= ORT_LOGGING_LEVEL_ERROR ? MAQ_LOG_ERROR : MAQ_LOG_WARNING;
@@ -140,8 +145,8 @@ void Session::open(const std::vector<uint8_t>& bytes, const SessionSettings& set
   check(api.SetSessionGraphOptimizationLevel(options.get(), ORT_ENABLE_ALL));
   // The networks run one after another: the threads of one must not keep spinning while the next one works.
   check(api.AddSessionConfigEntry(options.get(), "session.force_spinning_stop", "1"));
-  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning",
-                                  settings.spin && !has_own_threads ? "1" : "0"));
+  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.allow_spinning", has_own_threads ? "0" : "1"));
+  check(api.AddSessionConfigEntry(options.get(), "session.intra_op.spin_duration_us", kSpin_us));
   if (!settings.plans_memory) check(api.DisableMemPattern(options.get()));
   for (const auto& [size_name, size] : settings.fixed_sizes) {
     check(api.AddFreeDimensionOverrideByName(options.get(), size_name.c_str(), size));

@@ -47,7 +47,6 @@ struct TensorView {
 
 struct SessionSettings {
   int threads = 1;
-  bool spin = true;  // idle threads wait for work awake for a while: faster, and dearer in energy
   // Sizes that the graph leaves open, by the names it has for them: fixed, it runs faster, for inputs of these sizes
   // only.
   std::vector<std::pair<std::string, int64_t>> fixed_sizes = {};

@@ -47,7 +47,6 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
   config.key_frame_interval = options.key_frames;
   config.min_person_height_px = options.min_person_height_px;
   config.detail = options.no_surface ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
-  config.model.spinning = options.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
   config.person_crops = options.crops == "auto"  ? MAQ_DENSEPOSE_CROPS_AUTO
                         : options.crops == "all" ? MAQ_DENSEPOSE_CROPS_ALL
                                                  : MAQ_DENSEPOSE_CROPS_OFF;

@@ -29,7 +29,6 @@ void add_network_options(CLI::App& command, NetworkOptions& options, const std::
           "Threads of the networks, or \"measured\": the smallest number within 5 % of the fastest time; default: "
           "the large cores, at most 4")
       ->transform(CLI::Validator(read_threads, "1 to 64, or measured"));
-  command.add_flag("--no-spin", options.no_spin, "Let idle threads sleep instead of spin: saves energy, slower");
   command
       .add_option("--provider", options.provider,
                   "Library that runs the networks' layers: cpu (default); xnnpack or nnapi if ONNX Runtime has them")

@@ -11,7 +11,6 @@ class App;
 struct NetworkOptions {
   std::string bundle;
   int threads = 0;  // or MAQ_THREADS_MEASURED
-  bool no_spin = false;
   std::string provider = "cpu";
 };
 

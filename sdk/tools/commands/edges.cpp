@@ -180,7 +180,6 @@ int run_edges(const EdgesOptions& options) {
     maq_edges_config config = maquette::default_edges_config();
     config.model.bundle_path = bundle.c_str();
     config.model.threads = options.network.threads;
-    config.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
     config.skip_planes = options.skip_planes ? 1 : 0;
     config.average_frames = options.average;
     config.model.provider = provider_of(options.network);

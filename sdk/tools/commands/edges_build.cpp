@@ -68,7 +68,6 @@ int build(const BuildOptions& options) {
   maq_edges_config of_edges = maquette::default_edges_config();
   of_edges.model.bundle_path = bundle.c_str();
   of_edges.model.threads = options.network.threads;
-  of_edges.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
   of_edges.model.provider = provider_of(options.network);
   maquette::Edges edges(context, of_edges);
   maq_edges_fusion_config config = maquette::default_edges_fusion_config();

@@ -113,7 +113,6 @@ TEST(ActiveWindow, InsideOfItTheFieldIsThatOfTheWholeFrame) {
     for (int x = 40; x < 80; ++x) depth[size_t(y * kWide + x)] = 1;
   }
   maq::EdgesSettings settings;
-  settings.spin = false;
   maq::EdgesResult whole, part;
   maq::Edges(tiny_edges::runtime(), maq::read_bundle(tiny_edges::kBundle), settings)
       .run(tiny_edges::view_of(depth, kWide, kHigh), kCamera, whole);

@@ -56,7 +56,6 @@ TEST_F(EdgeBundles, ThatWriteTheOutputOverTheInputGiveTheSame) {
   write_text(folder_.file("manifest.json"), changed.dump());
   const auto apart = tiny_edges::edges();
   maq::EdgesSettings settings;
-  settings.spin = false;
   maq::Edges shared(tiny_edges::runtime(), maq::read_bundle(folder_.path().string()), settings);
   for (int round = 0; round < 2; ++round) {
     for (const tiny_edges::Case& size : tiny_edges::kCases) {

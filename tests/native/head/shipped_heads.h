@@ -47,7 +47,6 @@ class ShippedHeads : public testing::Test {
   }
   static maq::SessionSettings settings() {
     maq::SessionSettings made;
-    made.spin = false;
     return made;
   }
 

@@ -22,7 +22,6 @@ struct Encoder {
   static maq::SessionSettings settings(int threads) {
     maq::SessionSettings made;
     made.threads = threads;
-    made.spin = false;
     return made;
   }
   HeadEncoding run(const ImageView& photo, const HeadSquare& square) {

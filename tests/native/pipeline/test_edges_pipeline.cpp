@@ -20,7 +20,6 @@ maq_edges_config edges_config(const char* bundle = kTinyEdges) {
   maq_edges_config config = maquette::default_edges_config();
   config.model.bundle_path = bundle;
   config.model.threads = 1;
-  config.model.spinning = MAQ_SPINNING_OFF;
   return config;
 }
 

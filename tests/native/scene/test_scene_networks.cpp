@@ -20,7 +20,7 @@ class SceneNetworks : public testing::Test {
 
   std::unique_ptr<maq::SceneNetworks> open() const {
     return std::make_unique<maq::SceneNetworks>(tiny_scene::runtime(), maq::read_bundle(folder_.path().string()),
-                                                maq::SessionSettings{1, false});
+                                                maq::SessionSettings{});
   }
   json manifest() const { return json::parse(read_text(folder_.file("manifest.json"))); }
   void write_manifest(const json& manifest) const { write_text(folder_.file("manifest.json"), manifest.dump()); }

@@ -35,7 +35,7 @@ def camera_host():
 
 def document():
     frames = {name: {"cases": [case("s0", 0, 8.0), case("s1", 1, 10.0)], "warnings": ["others were busy"]}
-              for name in ("people", "sizes", "one_thread", "no_spin")}  # fmt: skip
+              for name in ("people", "sizes", "one_thread")}  # fmt: skip
     rows = [{"setting": name, "axis": axis, "ms": ms, "error": error, "error_cm": 10 * error, "box_ap": 0.5,
              "part_accuracy": 0.6}
             for name, axis, ms, error in (("as shipped", "shipped", 10.0, 0.6), ("192 px", "input size", 7.0, 0.65),

@@ -208,7 +208,7 @@ def has_model(kind: str) -> bool:
 @pytest.mark.parametrize("function", sorted(set(FUNCTIONS) - set(INITS) - {"maq_head_mesh_create"}))
 def test_model_options_out_of_range_are_refused_by_name(objects, function):
     for index, (kind, name) in enumerate(parameters(function)):
-        for option, value in (("threads", -2), ("threads", 65), ("spinning", 3), ("provider", 9)):
+        for option, value in (("threads", -2), ("threads", 65), ("provider", 9)):
             if has_model(kind):
                 values = valid(objects, function)
                 setattr(values[index].model, option, value)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 RIGHT = """
 from pathlib import Path
 import maquette, numpy as np, PIL.Image
-people = maquette.DensePose(long_side_px=384, person_crops="auto", threads=2, spinning="off", bundle_path=Path("a"))
+people = maquette.DensePose(long_side_px=384, person_crops="auto", threads=2, bundle_path=Path("a"))
 print(people.run(np.zeros((4, 6, 3), np.uint8)).iuv.shape, people.run(Path("a.jpg")))
 people.run(PIL.Image.new("L", (1, 1)))
 for result in maquette.Pipeline("camera:", maquette.DensePoseModel()):

@@ -61,7 +61,6 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   settings.key_frame_interval = std::max(config.key_frame_interval, 1);
   settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
-  settings.spin = may_spin(config.model);
   settings.crops = config.person_crops == MAQ_DENSEPOSE_CROPS_AUTO  ? PersonCrops::kAuto
                    : config.person_crops == MAQ_DENSEPOSE_CROPS_ALL ? PersonCrops::kAll
                                                                     : PersonCrops::kOff;

@@ -36,7 +36,6 @@ EdgesSettings maq::edges_settings(const maq_edges_config& config, const char* na
   require_range(prefix + "average_frames", config.average_frames, 0, DepthAverage::kMaxFrames);
   EdgesSettings settings;
   settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
-  settings.spin = may_spin(config.model);
   settings.provider = config.model.provider;
   settings.skips_planes = config.skip_planes == 1;
   settings.average_frames = std::max(config.average_frames, 1);

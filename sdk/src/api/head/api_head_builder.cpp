@@ -85,8 +85,8 @@ maq_status maq_head_builder_create(maq_context* context, const maq_head_builder_
     Bundle bundle = read_bundle_argument(config.model, "config.model", kHeadsBundle);
     const Manifest manifest = bundle.manifest;
     const auto runtime = context->state->onnxruntime();
-    SessionSettings settings{config.model.threads != 0 ? config.model.threads : default_threads(),
-                             may_spin(config.model)};
+    SessionSettings settings;
+    settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
     settings.provider = available_provider(*runtime, config.model.provider);
     auto made = std::make_unique<head::HeadBuilder>(runtime, std::move(bundle), settings, texture);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", manifest.name, " ", manifest.version, " (", manifest.precision,

@@ -31,7 +31,6 @@ NoveltyNetworks open_networks(ContextState& state, const maq_novelty_config& con
   require_model_options("config.model", config.model);
   SessionSettings settings;
   settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
-  settings.spin = may_spin(config.model);
   settings.provider = config.model.provider;
   const CodeBundle bundle(read_bundle_argument(config.model, "config.model", kNoveltyBundle));
   NoveltyNetworks networks;

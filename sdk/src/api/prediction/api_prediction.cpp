@@ -31,7 +31,6 @@ void open_networks(ContextState& state, const maq_predictor_config& config, Pred
   const CodeBundle bundle(read_bundle_argument(config.model, "config.model", kPredictorBundle));
   SessionSettings settings;
   settings.threads = recipe.motion.threads;
-  settings.spin = may_spin(config.model);
   settings.provider = config.model.provider;
   const bool is_refined = recipe.method == PredictionMethod::kRefined;
   if (is_refined ? !ResidualRefiner::is_in(bundle) : !TransformerBundle::is_in(bundle)) {

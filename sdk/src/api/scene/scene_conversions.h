@@ -27,7 +27,6 @@ inline SessionSettings scene_session_settings(const maq_model_options& model) {
   require_model_options("config.model", model, ThreadMeasuring::kUnsupported);
   SessionSettings settings;
   settings.threads = model.threads > 0 ? model.threads : default_threads();
-  settings.spin = may_spin(model);
   settings.provider = model.provider;
   return settings;
 }

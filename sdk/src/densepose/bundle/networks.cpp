@@ -8,8 +8,9 @@
 namespace maq {
 
 DensePoseNetworks::DensePoseNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle,
-                                     int threads, bool spin, maq_provider provider)
-    : runtime_(std::move(runtime)), bundle_(bundle), on_cpu_{threads, spin}, on_provider_{threads, spin} {
+                                     int threads, maq_provider provider)
+    : runtime_(std::move(runtime)), bundle_(bundle) {
+  on_cpu_.threads = on_provider_.threads = threads;
   on_provider_.provider = provider;
 }
 

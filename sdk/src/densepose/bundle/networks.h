@@ -14,7 +14,7 @@ namespace maq {
 class DensePoseNetworks {
  public:
   // `bundle` must outlive this. `provider` is one that the runtime has.
-  DensePoseNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, int threads, bool spin,
+  DensePoseNetworks(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bundle& bundle, int threads,
                     maq_provider provider);
 
   const std::shared_ptr<const OnnxRuntimeLibrary>& runtime() const { return runtime_; }

@@ -19,7 +19,6 @@ struct DensePoseSettings {
   PersonCrops crops = PersonCrops::kOff;
   int crop_side_px = 0;
   bool surface = true;
-  bool spin = true;
   maq_provider provider = MAQ_PROVIDER_CPU;
 };
 

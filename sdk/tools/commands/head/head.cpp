@@ -387,7 +387,6 @@ maq_head_builder_config builder_config(const HeadOptions& options, const std::st
   maq_head_builder_config config = maquette::default_head_builder_config();
   config.model.bundle_path = bundle.c_str();
   config.model.threads = options.network.threads;
-  config.model.spinning = options.network.no_spin ? MAQ_SPINNING_OFF : MAQ_SPINNING_DEFAULT;
   config.model.provider = provider_of(options.network);
   config.texture = options.no_texture ? MAQ_HEAD_TEXTURE_OFF : MAQ_HEAD_TEXTURE_ON;
   config.texture_px = options.no_texture ? 0 : options.texture_px;

@@ -25,7 +25,6 @@ inline maq_scene_renderer_config renderer_config() {
   maq_scene_renderer_config config = maquette::default_scene_renderer_config();
   config.model.bundle_path = kBundle.c_str();
   config.model.threads = 1;
-  config.model.spinning = MAQ_SPINNING_OFF;
   return config;
 }
 

@@ -33,6 +33,6 @@ struct TinyDensePose {
   const maq::Bundle bundle = maq::read_bundle(std::string(MAQ_TEST_DATA) + "/tiny_bundle");
   const maq::DensePoseSpec spec = maq::read_densepose_spec(bundle.manifest);
   maq::DensePoseSettings settings;
-  const maq::DensePoseNetworks networks{runtime, bundle, 1, false, MAQ_PROVIDER_CPU};
+  const maq::DensePoseNetworks networks{runtime, bundle, 1, MAQ_PROVIDER_CPU};
   maq::RunCancel cancel{runtime};
 };

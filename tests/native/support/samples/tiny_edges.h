@@ -25,7 +25,6 @@ inline std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 inline std::unique_ptr<maq::Edges> edges(int threads = 1, int average_frames = 1) {
   maq::EdgesSettings settings;
   settings.threads = threads;
-  settings.spin = false;
   settings.average_frames = average_frames;
   return std::make_unique<maq::Edges>(runtime(), maq::read_bundle(kBundle), settings);
 }

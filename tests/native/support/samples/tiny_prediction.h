@@ -25,7 +25,6 @@ inline std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 
 inline std::shared_ptr<maq::FrameEncoder> encoder(const std::string& bundle = kBundle) {
   maq::SessionSettings settings;
-  settings.spin = false;
   return std::make_shared<maq::FrameEncoder>(runtime(), maq::CodeBundle(maq::read_bundle(bundle)), settings);
 }
 

@@ -25,7 +25,7 @@ inline std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 
 inline std::unique_ptr<maq::SceneNetworks> networks(int threads = 1) {
   return std::make_unique<maq::SceneNetworks>(runtime(), maq::read_bundle(kFolder + "/bundle"),
-                                              maq::SessionSettings{threads, false});
+                                              maq::SessionSettings{threads});
 }
 
 inline maq::Capture capture() { return maq::open_capture(kFolder + "/capture"); }

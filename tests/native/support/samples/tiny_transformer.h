@@ -17,7 +17,6 @@ constexpr float kStep_s = 0.1f;
 
 inline std::shared_ptr<maq::CodeTransformer> open(const std::string& bundle = kBundle, int threads = 1) {
   maq::SessionSettings settings;
-  settings.spin = false;
   settings.threads = threads;
   return std::make_shared<maq::CodeTransformer>(tiny_prediction::runtime(), maq::CodeBundle(maq::read_bundle(bundle)),
                                                 settings);

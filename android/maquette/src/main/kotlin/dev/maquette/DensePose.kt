@@ -55,8 +55,6 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      * @property resultPoolSize results that the app may hold at once, 1 to 64; 0: 4.
      * @property keyFrameInterval 0 and 1: people are detected in each frame; N: in every N-th frame of a stream.
      * @property minPersonHeightPx people less tall than this in the frame may be missed.
-     * @property allowSpinning true: idle threads spin for a while, which is faster; false: they sleep, which saves
-     *   energy.
      * @property provider networks for which it cannot be had, or of which it takes less than half, run on the CPU;
      *   [DensePoseResult.Stats.provider] tells. The shipped int8 networks gain nothing from XNNPACK.
      */
@@ -70,14 +68,13 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         val keyFrameInterval: Int = 0,
         val minPersonHeightPx: Int = 0,
         val detail: Detail = Detail.SURFACE,
-        val allowSpinning: Boolean = false,
         val personCrops: PersonCrops = PersonCrops.OFF,
         val personCropPx: Int = 0,
         val provider: Provider = Provider.CPU,
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_densepose_config().also {
-                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.model.set(bundle, threads, provider)
                 it.long_side_px = longSidePx
                 it.score_threshold = scoreThreshold
                 it.max_people = maxPeople

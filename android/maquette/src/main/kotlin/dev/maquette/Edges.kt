@@ -19,7 +19,6 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
     /**
      * @property threads as of [DensePose.Config].
      * @property resultPoolSize results, and as many [EdgeCurves], that the app may hold at once.
-     * @property allowSpinning as of [DensePose.Config].
      * @property skipPlanes true: the network runs only where depth is not flat within the sensor's noise. This is
      *   faster and may miss flat creases in noise.
      * @property averageFrames 2 to 64: average depth over this number of frames, to reduce noise. The camera must not
@@ -28,14 +27,13 @@ class Edges internal constructor(pointer: Long) : AutoCloseable {
     data class Config(
         val threads: Int = 0,
         val resultPoolSize: Int = 4,
-        val allowSpinning: Boolean = false,
         val provider: DensePose.Provider = DensePose.Provider.CPU,
         val skipPlanes: Boolean = false,
         val averageFrames: Int = 0,
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_edges_config().also {
-                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.model.set(bundle, threads, provider)
                 it.result_pool_size = resultPoolSize
                 it.skip_planes = skipPlanes.toInt()
                 it.average_frames = averageFrames

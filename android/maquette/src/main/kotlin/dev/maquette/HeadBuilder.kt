@@ -41,7 +41,6 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
 
     /**
      * @property threads as of [DensePose.Config], for the network and the fit.
-     * @property allowSpinning as of [DensePose.Config].
      * @property provider as of [DensePose.Config].
      * @property texture with 1024 pixels a fit takes 140 MB of memory more.
      * @property texturePx pixels a side, 256 to 2048; 0: 1024. Not with [Texture.OFF].
@@ -51,7 +50,6 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      */
     data class Config(
         val threads: Int = 0,
-        val allowSpinning: Boolean = false,
         val provider: DensePose.Provider = DensePose.Provider.CPU,
         val texture: Texture = Texture.DEFAULT,
         val texturePx: Int = 0,
@@ -60,7 +58,7 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_head_builder_config().also {
-                it.model.set(bundle, threads, provider, spinning(allowSpinning))
+                it.model.set(bundle, threads, provider)
                 it.texture = texture.code
                 it.texture_px = texturePx
                 it.mirror_unseen = mirrorUnseen.toInt()

@@ -79,15 +79,11 @@ internal fun maq_model_options.set(
     bundle: ModelBundle?,
     threads: Int = 0,
     provider: DensePose.Provider = DensePose.Provider.CPU,
-    spinning: Int = MAQ_SPINNING_DEFAULT,
 ) {
     bundle?.writeTo(this)
     this.threads = threads
     this.provider = provider.code
-    this.spinning = spinning
 }
-
-internal fun spinning(isAllowed: Boolean) = if (isAllowed) MAQ_SPINNING_ON else MAQ_SPINNING_OFF
 
 /** Yes and no of the C API. */
 internal fun Boolean.toInt() = if (this) 1 else 0

@@ -215,19 +215,17 @@ class Novelty internal constructor(
 
     /**
      * @property threads as in [DensePose.Config].
-     * @property allowSpinning as in [DensePose.Config].
      * @property eventRatio a frame is an event from this ratio up, and from 1 / eventRatio down; above 1, at most 1e6;
      *   0: 4.
      */
     data class Config(
         val threads: Int = 0,
-        val allowSpinning: Boolean = false,
         val eventRatio: Float = 4f,
         val method: Method = Method.AUTO,
     ) {
         internal fun native(bundle: ModelBundle?) =
             maq_novelty_config().also {
-                it.model.set(bundle, threads, spinning = spinning(allowSpinning))
+                it.model.set(bundle, threads)
                 it.event_ratio = eventRatio
                 it.method = method.code
             }

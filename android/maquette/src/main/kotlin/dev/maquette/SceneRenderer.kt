@@ -28,19 +28,16 @@ class SceneRenderer internal constructor(
      *   own alpha is not used. null: pixels without points have the mean colour that the photos show beside the points.
      * @property nearDepth points nearer to the camera, along its axis, are not drawn; units of the scene.
      * @property imagePoolSize images that the app may hold at once, 1 to 64; 0: 4.
-     * @property allowSpinning true: idle threads spin for a while, which is faster; false: they sleep, which saves
-     *   energy.
      */
     data class Config(
         val threads: Int = 0,
         val background: Int? = null,
         val nearDepth: Double = 0.0,
         val imagePoolSize: Int = 0,
-        val allowSpinning: Boolean = false,
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_scene_renderer_config().also {
-                it.model.set(bundle, threads, spinning = spinning(allowSpinning))
+                it.model.set(bundle, threads)
                 it.use_background = (background != null).toInt()
                 it.background = rgbOf(background)
                 it.near_depth = nearDepth

@@ -244,8 +244,6 @@ internal const val MAQ_SOURCE_CONTROL_WHITE_BALANCE = 7; internal const val MAQ_
 internal const val MAQ_SOURCE_STARTED = 1; internal const val MAQ_SOURCE_STALLED = 2
 internal const val MAQ_SOURCE_LOST = 3; internal const val MAQ_SOURCE_RECONNECTING = 4
 internal const val MAQ_SOURCE_RECONNECTED = 5
-internal const val MAQ_SPINNING_DEFAULT = 0; internal const val MAQ_SPINNING_ON = 1
-internal const val MAQ_SPINNING_OFF = 2
 internal const val MAQ_OK = 0; internal const val MAQ_ERROR_INVALID_ARGUMENT = 1
 internal const val MAQ_ERROR_VERSION_MISMATCH = 2; internal const val MAQ_ERROR_NOT_FOUND = 3
 internal const val MAQ_ERROR_UNREADABLE = 4; internal const val MAQ_ERROR_IMAGE_SIZE = 5
@@ -316,9 +314,8 @@ internal class maq_context_config(outer: Memory? = null, at: Int = 0) : Struct(3
 }
 
 internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32, outer, at) {
-    var threads: Int get() = int(0); set(v) = int(0, v); var spinning: Int get() = int(4); set(v) = int(4, v)
-    var provider: Int get() = int(8); set(v) = int(8, v)
-    var bundle_file_count: Int get() = int(12); set(v) = int(12, v); val bundle_path get() = Pointer(this, 16)
+    var threads: Int get() = int(0); set(v) = int(0, v); var provider: Int get() = int(4); set(v) = int(4, v)
+    var bundle_file_count: Int get() = int(8); set(v) = int(8, v); val bundle_path get() = Pointer(this, 16)
     val bundle_files get() = Pointer(this, 24)
 }
 

@@ -19,8 +19,12 @@ case "$1 $2" in
     test -n "$NO_ENSUREPIP" && { echo "ensurepip is not available"; exit 1; }
     touch "$3/pip" ;;
 "-m pip")
-    echo "$*" >>installed.txt
-    test -z "$PIP_SAYS" || { echo "$PIP_SAYS" >&2; exit 1; } ;;
+    test -z "$PIP_SAYS" || { echo "$PIP_SAYS" >&2; exit 1; }
+    case "$*" in *" uv=="*) exit 0 ;; esac
+    echo "$*" >>installed.txt ;;
+"-m uv")
+    test -z "$UV_SAYS" || { echo "$UV_SAYS" >&2; exit 1; }
+    echo "$*" >>installed.txt ;;
 esac
 """
 
@@ -48,10 +52,18 @@ def test_packages_are_installed_once_until_the_list_changes(project):
     assert make_venv(project, "dev").returncode == 0
     installed = project / "installed.txt"
     assert len(installed.read_text().splitlines()) == 1
+    assert installed.read_text().startswith("-m uv pip install")
     assert "-e .[dev]" in installed.read_text()
     os.utime(project / "pyproject.toml", (2**32, 2**32))
     make_venv(project, "dev")
     assert len(installed.read_text().splitlines()) == 2
+
+
+def test_pip_installs_what_uv_cannot(project):
+    done = make_venv(project, "dev", UV_SAYS="no such index")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert (project / "installed.txt").read_text().startswith("-m pip install")
 
 
 def test_programs_of_the_environment_name_its_place(project):

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "arguments/bundle_argument.h"
 #include "arguments/model_options.h"
 #include "commands/commands.h"
 #include "commands/edges_commands.h"

@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "arguments/bundle_argument.h"
 #include "arguments/model_options.h"
 #include "commands/edges_commands.h"
 #include "interrupt.h"

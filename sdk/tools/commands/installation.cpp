@@ -15,14 +15,15 @@ namespace fs = std::filesystem;
 
 namespace {
 
-void use_bundle(maq_model_options& model, const std::string& bundle) {
+[[maybe_unused]] void use_bundle(maq_model_options& model, const std::string& bundle) {
   model.bundle_path = bundle.c_str();
   model.threads = 1;
 }
 
 // Throws the library's sentence about networks that it cannot read.
-void load_networks(const maquette::Context& context, const SystemNetworks& networks, const std::string& bundle) {
-  const std::string system = networks.system;
+void load_networks([[maybe_unused]] const maquette::Context& context, const SystemNetworks& networks,
+                   [[maybe_unused]] const std::string& bundle) {
+  [[maybe_unused]] const std::string system = networks.system;
 #if MAQ_HAS_DENSEPOSE
   if (system == kDenseposeNetworks.system) {
     maq_densepose_config config = maquette::default_densepose_config();

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "arguments/bundle_argument.h"
 #include "commands/scene_commands.h"
 #include "interrupt.h"
 #include "machine.h"

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "arguments/bundle_argument.h"
 #include "arguments/picture_size.h"
 #include "commands/scene_commands.h"
 #include "commands/scene_flight.h"

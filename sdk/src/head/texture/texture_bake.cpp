@@ -25,6 +25,18 @@ constexpr int kMargin_px = 2;  // of a photo's square
 // Differences of photos fade with the distance from the visible part: to 1 / e over this fraction of the texture's
 // side. Found on validation heads: new views are best at 0.4 to 1.
 constexpr double kFadeFraction = 0.4;
+// Dark differences at the edge are mostly shadows and gaps in the hair: from the first luma on (grey levels) they fade
+// sooner, from the second wholly, to 1 / e over a third of that distance.
+constexpr double kFirstDark = 0, kWholeDark = 20;
+// The front of the neck is this far from the texture's middle, in sides. There a photo often shows a collar or the
+// shadow of the chin: from the first luma below the photos' mean on its pixels count less, from the second not at all.
+constexpr double kNeckFraction = 0.43, kFirstCollar = 35, kWholeCollar = 70;
+// The light is known for the mesh's colours that photos show. Colours darker than all but this fraction of these keep
+// their hue: they are scaled as the darkest that is known.
+constexpr double kDarkestFraction = 0.2;
+// No part is darker in the photos' light than by this factor of its colour in the mean light of what they show: the
+// light on the back is a guess.
+constexpr double kMinLight = 0.6;
 
 double smooth_step(double value, double first, double whole) {
   const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
@@ -36,6 +48,8 @@ struct Texels {
   std::vector<float> positions, normals, colours;  // [side][side][3]
   std::vector<uint8_t> is_surface, is_cap;         // [side][side]
 };
+
+double luma(const float* rgb) { return 0.299 * double(rgb[0]) + 0.587 * double(rgb[1]) + 0.114 * double(rgb[2]); }
 
 struct Differences {
   std::vector<float> values;   // [side][side][3]: photo less mesh, 0 to 255
@@ -249,19 +263,41 @@ Differences mirrored(const Differences& known, const Texels& texels, int side) {
   return made;
 }
 
-// The mesh's colours are converted to the photos' light; differences are then relative to them.
-PhotoLight match_light(Texels& texels, Differences& seen) {
-  const PhotoLight light = fit_photo_light(seen.weights, texels.colours, seen.values, texels.normals);
+void leave_out_collars(const Texels& texels, int side, Differences& seen) {
+  double sum = 0, weight = 0;
   for (size_t i = 0; i < seen.weights.size(); ++i) {
-    if (texels.is_surface[i] == 0 || texels.is_cap[i] != 0) continue;
+    if (seen.weights[i] <= 0) continue;
+    sum += double(seen.weights[i]) * luma(&seen.values[3 * i]), weight += double(seen.weights[i]);
+  }
+  if (weight <= 0) return;
+  for (size_t i = 0; i < seen.weights.size(); ++i) {
+    if (seen.weights[i] <= 0 || texels.is_cap[i] != 0) continue;
+    const double row = double(i / size_t(side)) + 0.5, column = double(i % size_t(side)) + 0.5;
+    if (std::hypot(row - 0.5 * side, column - 0.5 * side) < kNeckFraction * side) continue;
+    seen.weights[i] *= float(1 - smooth_step(sum / weight - luma(&seen.values[3 * i]), kFirstCollar, kWholeCollar));
+  }
+}
+
+// For each channel, the value of the mesh's colours below which the fraction kDarkestFraction of those that photos show
+// is.
+std::array<float, 3> darkest_seen(const Texels& texels, const std::vector<float>& weights) {
+  std::array<std::array<double, 256>, 3> histograms{};
+  double total = 0;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] <= 0) continue;
+    total += double(weights[i]);
     for (size_t c = 0; c < 3; ++c) {
-      float& own = texels.colours[3 * i + c];
-      const float in_light = light[c](own, &texels.normals[3 * i]);
-      if (seen.weights[i] > 0) seen.values[3 * i + c] += own - in_light;
-      own = in_light;
+      histograms[c][size_t(std::clamp(texels.colours[3 * i + c], 0.0f, 255.0f))] += double(weights[i]);
     }
   }
-  return light;
+  std::array<float, 3> darkest{};
+  for (size_t c = 0; c < 3; ++c) {
+    size_t value = 0;
+    double below = 0;
+    while (value < 255 && below + histograms[c][value] <= kDarkestFraction * total) below += histograms[c][value++];
+    darkest[c] = total > 0 ? float(value) : 0;
+  }
+  return darkest;
 }
 
 // For each channel, the mean strength of the light on the part that the photos show.
@@ -275,6 +311,26 @@ std::array<double, 3> mean_strength(const PhotoLight& light, const Texels& texel
   }
   for (double& sum : sums) sum = total > 0 ? sum / total : 0;
   return sums;
+}
+
+// The mesh's colours are converted to the photos' light; differences are then relative to them.
+PhotoLight match_light(Texels& texels, Differences& seen) {
+  const PhotoLight light = fit_photo_light(seen.weights, texels.colours, seen.values, texels.normals);
+  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
+  const std::array<float, 3> darkest = darkest_seen(texels, seen.weights);
+  for (size_t i = 0; i < seen.weights.size(); ++i) {
+    if (texels.is_surface[i] == 0 || texels.is_cap[i] != 0) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      float& own = texels.colours[3 * i + c];
+      const double known = double(std::max(own, darkest[c]));
+      const double directed = light[c].strength(&texels.normals[3 * i]) * known + light[c].offset;
+      double in_light = std::clamp(std::max(directed, kMinLight * (even[c] * known + light[c].offset)), 0.0, 255.0);
+      if (double(own) < known) in_light *= double(own) / known;
+      if (seen.weights[i] > 0) seen.values[3 * i + c] += own - float(in_light);
+      own = float(in_light);
+    }
+  }
+  return light;
 }
 
 }  // namespace
@@ -302,6 +358,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   Texels texels = draw_texels(mesh, side, threads);
   if (earlier.side_px > 0) take_colours(earlier, side, texels);
   Differences seen = blend(photos, mesh, texels, side, threads);
+  leave_out_collars(texels, side, seen);
   const PhotoLight light = match_light(texels, seen);
   const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
   if (options.mirror_unseen) seen = mirrored(seen, texels, side);
@@ -315,11 +372,13 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
     if (texels.is_surface[i] == 0) continue;
     is_known[i] = 1;
     const float known = seen.weights[i];
-    const float fade =
-        texels.is_cap[i] != 0 ? 0 : float(std::exp(-double(distances[i]) / (kFadeFraction * double(side))));
+    double fade = texels.is_cap[i] != 0 ? 0 : std::exp(-double(distances[i]) / (kFadeFraction * double(side)));
+    const double dark = smooth_step(-luma(&around[3 * i]), kFirstDark, kWholeDark);
+    if (dark > 0) fade += dark * (fade * fade * fade - fade);
     for (size_t c = 0; c < 3; ++c) {
       float& colour = colours[3 * i + c];
-      colour = texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * fade * around[3 * i + c];
+      colour =
+          texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * float(fade) * around[3 * i + c];
       if (options.delight && texels.is_cap[i] == 0) {
         colour = light[c].evened(colour, &texels.normals[3 * i], even[c]);
       }

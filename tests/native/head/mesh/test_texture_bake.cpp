@@ -24,19 +24,19 @@ constexpr uint8_t kOwn = 100;  // the mesh's colour
 
 // Cut off below.
 template <class Field>
-HeadMesh mesh_of(Field&& field) {
+HeadMesh mesh_of(Field&& field, float cut_dm = 0.9f) {
   MarchingCubesOptions options;
   options.box_min = {-2.2f, -2.2f, -2.2f}, options.box_max = {2.2f, 2.2f, 2.2f}, options.cell = 0.06f;
   maq::WorkerThreads threads(1);
   HeadMesh mesh = marching_cubes(
       [&](const float* x, const float* y, const float* z, float* f, size_t n) {
-        for (size_t i = 0; i < n; ++i) f[i] = std::max(field(x[i], y[i], z[i]), -0.9f - z[i]);
+        for (size_t i = 0; i < n; ++i) f[i] = std::max(field(x[i], y[i], z[i]), -cut_dm - z[i]);
       },
       options, threads);
   set_normals(mesh);
   mesh.template_points = mesh.positions;
   mesh.colours.assign(mesh.positions.size(), kOwn);
-  set_texture_coordinates(mesh, find_cap(mesh, {0, 0, -1}, 0.9f, 0.003f));
+  set_texture_coordinates(mesh, find_cap(mesh, {0, 0, -1}, cut_dm, 0.003f));
   return mesh;
 }
 
@@ -119,6 +119,50 @@ TEST(TextureBake, HairThatAPhotoShowsDarkerIsDarkerBehind) {
   const int skin = at(image, maq::normalized({0, 1, -0.3}))[0], hair = at(image, maq::normalized({0, 1, 0.6}))[0];
   EXPECT_NEAR(skin, 160, 30);
   EXPECT_NEAR(hair, 30, 30);
+}
+
+TEST(TextureBake, ADarkEdgeOfWhatAPhotoSeesDoesNotDarkenTheBack) {
+  TexturePhoto photo = photo_from(kFront, {150, 120, 100});
+  for (size_t y = 0; y < 200; ++y) {
+    for (size_t x = 0; x < 200; ++x) {  // the ball has a radius of 67 pixels
+      if (std::hypot(double(x) - 99.5, double(y) - 99.5) > 50)
+        std::fill_n(&photo.rgb[(y * 200 + x) * 3], 3, uint8_t(10));
+    }
+  }
+  const TextureImage image = bake(ball(), {photo});
+  expect_near(at(image, kFront), {150, 120, 100}, 1);
+  EXPECT_GT(at(image, kBack)[0], 40);
+}
+
+TEST(TextureBake, ColoursThatNoPhotoShowsKeepTheirHue) {
+  HeadMesh mesh = ball();  // its back is dark and brown, its front from 120 to 200
+  for (size_t i = 0; i < mesh.vertex_count(); ++i) {
+    const bool is_back = mesh.positions[3 * i + 1] > 0.3f;
+    const float front = 160 + 40 * mesh.positions[3 * i];
+    const float colours[3] = {is_back ? 60 : front, is_back ? 48 : front, is_back ? 36 : front};
+    std::copy(colours, colours + 3, &mesh.colours[3 * i]);
+  }
+  // Half the contrast: 80 + own / 2, in green alone.
+  TexturePhoto photo = photo_from(kFront, {0, 0, 0});
+  for (size_t i = 0; i < 200 * 200; ++i) {
+    const double x = (double(i % 200) - 99.5) / 400 * 5.1, own = std::clamp(160 + 40 * x, 120.0, 200.0);
+    photo.rgb[3 * i] = photo.rgb[3 * i + 2] = uint8_t(own), photo.rgb[3 * i + 1] = uint8_t(80 + own / 2);
+  }
+  const Rgb back = at(bake(mesh, {photo}), maq::normalized({0, 1, 0.2}));
+  EXPECT_GT(back[0], back[1]) << "the line through the bright colours makes it green";
+  EXPECT_GT(back[1], back[2]);
+}
+
+TEST(TextureBake, ADarkCollarIsNotPaintedOnTheNeck) {
+  const HeadMesh mesh = mesh_of(  // a ball on a neck
+      [](float x, float y, float z) { return std::min(std::hypot(x, y, z) - 1, std::hypot(x, y) - 0.6f); }, 1.3f);
+  TexturePhoto photo = photo_from(kFront, {150, 120, 100});
+  std::fill(photo.rgb.begin() + size_t(200) * 3 * 176, photo.rgb.end(), uint8_t(10));
+  const TextureImage image = bake(mesh, {photo});
+  int darkest = 255;
+  for (int i = -20; i <= 20; ++i)
+    darkest = std::min(darkest, at(image, {0.5 * std::sin(0.05 * i), -0.6 * std::cos(0.05 * i), -1.2})[0]);
+  EXPECT_GT(darkest, 100);
 }
 
 TEST(TextureBake, WithoutPhotosAndOutsideTheMatteItIsTheMeshs) {

@@ -56,6 +56,10 @@ test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2
 test-camera-vm: packages-test build  ## camera tests on a real kernel in qemu, with test cameras; part of `test-all`
 	@tests/camera_vm/run.sh
 
+.PHONY: test-windows
+test-windows: packages-windows build  ## the SDK for Windows without cameras, and its results under Wine beside those of Linux; not part of `test-all`
+	@scripts/windows/test.sh $(JOBS)
+
 .PHONY: test-hostile
 test-hostile: packages-test build  ## some 4,000 hostile inputs to the built program: crashes, hangs, unclear errors; not part of `test-all`
 	@scripts/make-venv.sh
@@ -157,8 +161,8 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-test-all
-packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel: packages-%:
+.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows packages-test-all
+packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows: packages-%:
 	@scripts/install-packages.sh $*
 
 packages-test-all:  # a group whose packages cannot be installed prints why it is not run

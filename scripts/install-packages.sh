@@ -10,6 +10,7 @@
 #   scripts/install-packages.sh fuzz        + Clang with libFuzzer (test, too)
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh wheel       to build the SDK, and: what builds codecs from source
+#   scripts/install-packages.sh windows     to build the SDK, and: a compiler for Windows, what builds codecs, Wine (1.2 GB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
 #   scripts/install-packages.sh site        to build the site: Doxygen, Maven
@@ -18,11 +19,11 @@
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,17s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,18s/^# \{0,1\}//p' "$0"; }
 
 for group in "${@:-}"; do
     case "$group" in
-        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | wheel | release | site) ;;
+        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | wheel | windows | release | site) ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac
@@ -102,7 +103,11 @@ if wants camera-vm; then
     needs_command cam libcamera-tools
     needs_command udevadm udev
 fi
-if wants wheel; then
+if wants windows; then
+    needs_command x86_64-w64-mingw32-g++-posix g++-mingw-w64-x86-64-posix
+    needs_package wine64
+fi
+if wants wheel windows; then
     needs_command dpkg-source dpkg-dev
     needs_command nasm nasm
     needs_command autoreconf autoconf

@@ -2,7 +2,7 @@
 # Builds the codecs that become part of libmaquette.so in wheels: libjpeg-turbo, libpng, libwebp, libvpx and zlib, from the
 # sources of this Debian, into .deps/codecs-MACHINE (include/, lib/, licenses/).
 #
-#   scripts/static-codecs.sh [x86_64 | aarch64] [JOBS]
+#   scripts/static-codecs.sh [x86_64 | aarch64 | windows-x86_64] [JOBS]
 #
 # Debian's own static libraries cannot be a part of a shared library. apt works in a folder of its own and checks sources
 # by Debian's signatures. Changes nothing of the system; remove the folder to build anew. 15 MB, one to three minutes.
@@ -13,6 +13,7 @@ jobs="${2:-$(nproc)}"
 case "$machine" in
     x86_64) prefix= vpx_target=x86_64-linux-gcc ;;
     aarch64) prefix=aarch64-linux-gnu- vpx_target=arm64-linux-gcc ;;
+    windows-x86_64) prefix=x86_64-w64-mingw32- vpx_target=x86_64-win64-gcc ;;
     *) sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
 esac
 [ "$(uname -m)" != "$machine" ] || prefix=
@@ -35,7 +36,9 @@ echo "Building static codecs for $machine (sources of 15 MB, once)"
     { cat "$work/source.log" >&2; exit 1; }
 
 # Nothing is searched beyond the codecs: flags are the same on all machines.
-export CC="${prefix}gcc" CXX="${prefix}g++" AR="${prefix}ar" RANLIB="${prefix}ranlib" CFLAGS="-O2 -fPIC -fvisibility=hidden \
+gcc="${prefix}gcc" gxx="${prefix}g++"
+[ "$machine" != windows-x86_64 ] || gcc+=-posix gxx+=-posix  # threads of C++ need this variant
+export CC="$gcc" CXX="$gxx" AR="${prefix}ar" RANLIB="${prefix}ranlib" CFLAGS="-O2 -fPIC -fvisibility=hidden \
 -fstack-protector-strong -D_FORTIFY_SOURCE=2 -ffunction-sections -fdata-sections -ffp-contract=off -ffile-prefix-map=$work=."
 host=()
 [ -z "$prefix" ] || host=(--host="${prefix%-}")
@@ -43,13 +46,18 @@ run() { "$@" >>"$work/build.log" 2>&1 || { tail -40 "$work/build.log" >&2; exit 
 each() { echo "$work/$1"-[0-9]*/; }
 
 cd $(each zlib)
-CHOST="${prefix%-}" run ./configure --static --prefix="$codecs"
+chost="${prefix%-}"
+[ "$machine" != windows-x86_64 ] || chost=  # for which this script of zlib refuses to work; $CC is enough
+CHOST="$chost" run ./configure --static --prefix="$codecs"
 run make -j"$jobs" libz.a
 cp libz.a "$codecs/" && mkdir -p "$codecs/include" "$codecs/lib" && mv "$codecs/libz.a" "$codecs/lib/"
 cp zlib.h zconf.h "$codecs/include/"
 
 cd $(each libjpeg-turbo)
 system=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR="$machine")
+[ "$machine" != windows-x86_64 ] ||
+    system=(-DCMAKE_SYSTEM_NAME=Windows -DCMAKE_SYSTEM_PROCESSOR=x86_64 -DCMAKE_INSTALL_PREFIX="$codecs"
+        -DCMAKE_RC_COMPILER="${prefix}windres")
 run cmake -B build -G Ninja -DCMAKE_BUILD_TYPE=None -DENABLE_SHARED=OFF -DWITH_JAVA=OFF -DREQUIRE_SIMD=ON \
     $([ -z "$prefix" ] || echo "${system[@]}")
 run ninja -C build -j"$jobs" turbojpeg-static

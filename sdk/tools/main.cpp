@@ -10,6 +10,7 @@ int main(int argc, char** argv) try {
       "Maquette: dense pose of people, edges in depth frames, heads and scenes from photos, and prediction of frames, "
       "on the CPU.");
   app.require_subcommand(1);
+  app.allow_windows_style_options(false);  // "/" begins a path on all systems
   app.set_version_flag("--version", std::string("maquette ") + maq_get_sdk_version());
   app.footer(
 #if MAQ_HAS_DENSEPOSE
@@ -21,7 +22,9 @@ int main(int argc, char** argv) try {
   int exit_code = 0;
   add_info_command(app, &exit_code);
   add_sources_command(app, &exit_code);
+#if !defined(_WIN32)
   add_doctor_command(app, &exit_code);
+#endif
   add_play_command(app, &exit_code);
 #if MAQ_HAS_PREDICTION
   add_predict_command(app, &exit_code);
@@ -40,7 +43,7 @@ int main(int argc, char** argv) try {
 #if MAQ_HAS_SCENES
   add_scene_command(app, &exit_code);
 #endif
-#if MAQ_HAS_DENSEPOSE
+#if MAQ_HAS_DENSEPOSE && !defined(_WIN32)
   add_bench_command(app, &exit_code);
 #endif
   return run_program(app, argc, argv, &exit_code);

@@ -6,6 +6,12 @@
 #include <stdexcept>
 #include <string>
 
+#if defined(_WIN32)
+#define MAQ_FORMAT_KIND gnu_printf  // of MinGW's library; that of Windows has other formats
+#else
+#define MAQ_FORMAT_KIND printf
+#endif
+
 class OutputLost : public std::runtime_error {
  public:
   explicit OutputLost(int reason);  // errno
@@ -15,11 +21,11 @@ class OutputLost : public std::runtime_error {
 std::string printable(const std::string& text);
 
 // As printf, but made printable apart from line ends. Throws OutputLost, at the latest at the next flush_output().
-[[gnu::format(printf, 1, 2)]] void print_output(const char* format, ...);
+[[gnu::format(MAQ_FORMAT_KIND, 1, 2)]] void print_output(const char* format, ...);
 // Writes text with its control characters. Throws OutputLost too.
 void print_unchanged(const std::string& text);
 // Throws OutputLost.
 void flush_output();
 
 // The same on standard error; text that cannot be written there is lost.
-[[gnu::format(printf, 1, 2)]] void print_error(const char* format, ...);
+[[gnu::format(MAQ_FORMAT_KIND, 1, 2)]] void print_error(const char* format, ...);

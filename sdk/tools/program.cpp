@@ -1,33 +1,23 @@
 #include "program.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
-#include <csignal>
-#include <cstdlib>
 #include <exception>
 #include <new>
 #include <sstream>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "interrupt.h"
+#include "own_program.h"
 #include "print.h"
+#include "standard_streams.h"
 
 namespace {
 
 constexpr int kFailed = 1;
 constexpr int kWrongUsage = 2;
 constexpr int kOfSignals = 128;  // added to the number of a signal, as shells do for programs that signals end
-
-// A closed one would be the number of the first file that is opened, and what is printed would go there. Nothing can
-// be written to what takes its place.
-void fill_standard_descriptors() {
-  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (fcntl(number, F_GETFD) < 0 && open("/dev/null", O_RDONLY) != number) std::abort();
-  }
-}
 
 // Returns the exit code of a run that failed or was cut short.
 int failure() { return interrupted() ? kOfSignals + interrupting_signal() : kFailed; }
@@ -78,12 +68,13 @@ maquette::Context open_context() {
 }
 
 int run_program(CLI::App& app, int argc, char** argv, const int* exit_code) {
-  fill_standard_descriptors();
-  // Output that is lost is an error, told and cleaned up after, and not the end of the process.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
+  prepare_standard_streams();
   try {
-    const int result = parse(app, argc, argv, exit_code);
+    std::vector<std::string> arguments = own_arguments(argc, argv);
+    std::vector<char*> pointers;
+    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    pointers.push_back(nullptr);
+    const int result = parse(app, int(arguments.size()), pointers.data(), exit_code);
     flush_output();
     return result == kFailed ? failure() : result;
   } catch (const std::exception& error) {

@@ -144,7 +144,7 @@ MAQ_API maq_status maq_source_acquire_frame(maq_source* source, int64_t timeout_
 /* Gets a file descriptor for poll, epoll or an Android looper. It is readable when maq_source_acquire_frame would not
  * wait: a frame waits, or the source has ended, failed or was stopped. Then acquire with a timeout of 0. A damaged
  * frame is dropped, and that call returns MAQ_TIMEOUT. The descriptor stays the source's: do not read, write or close
- * it.
+ * it. On Windows it is the value of an event HANDLE, for WaitForSingleObject: (HANDLE)(intptr_t)fd.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (not live: frames need no waiting),
  * MAQ_ERROR_OUT_OF_MEMORY (the process has no descriptor left). Does not block. */
 MAQ_API maq_status maq_source_get_event_fd(maq_source* source, int32_t* fd);

@@ -1,7 +1,5 @@
 #include "api/handle_state.h"
 
-#include <pthread.h>
-
 #include <cstddef>
 #include <iterator>
 #include <mutex>
@@ -32,18 +30,7 @@ struct RetiredHandles {
 };
 RetiredHandles retired;
 
-std::atomic<uint32_t> forks{0};
-
 }  // namespace
-
-uint32_t fork_count() {
-  // Numbers of processes do not tell: in a new namespace the child may have its parent's.
-  static const bool is_registered = [] {
-    if (pthread_atfork(nullptr, nullptr, [] { ++forks; }) != 0) throw std::bad_alloc();
-    return true;
-  }();
-  return is_registered ? forks.load(std::memory_order_relaxed) : 0;
-}
 
 bool HandleState::is_held() const {
   const uint32_t word = word_.load(std::memory_order_relaxed);

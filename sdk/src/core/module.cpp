@@ -71,13 +71,17 @@ LibraryOpening open_library(const std::string& path) {
   }
 }
 
+void* find_symbol(void* library, const char* name) { return dlsym(library, name); }
+
+void close_library(void* library) { dlclose(library); }
+
 void* open_module(const char* file, const char* symbol, const char* needed_for, const char* remedy) {
   const std::string path = module_path(file);
   const auto [library, error] = open_library(path);
   if (library == nullptr) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, needed_for, " ", path, ", which cannot be opened: ", error, ". ", remedy);
   }
-  const auto get_export = reinterpret_cast<ModuleExport (*)()>(dlsym(library, symbol));
+  const auto get_export = reinterpret_cast<ModuleExport (*)()>(find_symbol(library, symbol));
   const ModuleExport found = get_export == nullptr ? ModuleExport{"", nullptr} : get_export();
   if (found.object == nullptr || std::strcmp(found.version, sdk_version()) != 0) {
     throw Error(MAQ_ERROR_RUNTIME_LIBRARY, path, " is of version '", found.version, "', but this SDK is ",

@@ -41,6 +41,10 @@ struct LibraryOpening {
 // With all symbols resolved and kept private. Throws std::bad_alloc where there is too little memory.
 LibraryOpening open_library(const std::string& path);
 
+// Null where the library does not have it.
+void* find_symbol(void* library, const char* name);
+void close_library(void* library);
+
 // Opens a module and returns the object that its function `symbol` exports. It is never closed again: the foreign
 // libraries do not survive unloading, and their threads may still run. Throws MAQ_ERROR_RUNTIME_LIBRARY where the
 // module is missing or of another build; the sentence begins with `needed_for` ("Image and video files need") and ends

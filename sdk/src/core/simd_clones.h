@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <cstring>
 
-// Sanitizers are not ready yet when the loader asks which version to take.
+// Sanitizers are not ready yet when the loader asks which version to take. Windows' loader does not ask.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+    !defined(__SANITIZE_THREAD__) && !defined(_WIN32)
 // flatten: called functions must be inlined; otherwise they would be compiled for any processor only.
 #define MAQ_SIMD_CLONES __attribute__((target_clones("avx2", "default"), flatten))
 #else

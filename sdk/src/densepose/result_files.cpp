@@ -45,7 +45,9 @@ std::vector<uint8_t> interleaved(const DensePlanes& planes) {
 }  // namespace
 
 void write_result_files(const DensePoseResult& result, const std::string& folder, const std::string& stem) {
-  const auto path_of = [&](const char* suffix) { return (std::filesystem::path(folder) / (stem + suffix)).string(); };
+  const auto path_of = [&](const char* suffix) {
+    return (std::filesystem::u8path(folder) / std::filesystem::u8path(stem + suffix)).string();
+  };
   AtomicFile iuv_file(path_of("_IUV.png")), inds_file(path_of("_INDS.png")), json_file(path_of(".json"));
   const std::vector<uint8_t> pixels = interleaved(result.planes);
   const std::vector<uint8_t> iuv = encode_image(view_of(MAQ_PIXEL_BGR8, result.planes, pixels.data()), ".png");

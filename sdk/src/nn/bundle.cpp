@@ -75,7 +75,7 @@ Bundle read_bundle(const std::string& folder) {
     if (listed == nullptr) return read_file(path, kMaxManifestBytes);
     // A file of another size is not even read.
     std::error_code is_no_file;
-    const uintmax_t size_bytes = std::filesystem::file_size(path, is_no_file);
+    const uintmax_t size_bytes = std::filesystem::file_size(std::filesystem::u8path(path), is_no_file);
     if (!is_no_file) check_size(size_bytes, *listed, path);
     return read_file(path, std::min(uint64_t(listed->bytes), kMaxModelBytes));
   };

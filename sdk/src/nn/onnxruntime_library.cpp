@@ -1,7 +1,5 @@
 #include "nn/onnxruntime_library.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -16,6 +14,7 @@
 #include "core/error.h"
 #include "core/memory.h"
 #include "core/module.h"
+#include "nn/telemetry.h"
 
 namespace maq {
 namespace {
@@ -25,9 +24,9 @@ constexpr uint32_t kApiVersion = 20;
 // Functions that are called if the library has them (provider.cpp).
 constexpr uint32_t kNewerApiVersion = 24;
 static_assert(kNewerApiVersion <= ORT_API_VERSION, "the headers are of an older ONNX Runtime");
-constexpr char kFileName[] = "libonnxruntime.so.1";
+constexpr char kFileName[] = MAQ_ONNXRUNTIME_FILE;
 constexpr char kRemedy[] =
-    " Set MAQ_ONNXRUNTIME_LIB to the file, or put libonnxruntime.so.1 in the folder of libmaquette.so.";
+    " Set MAQ_ONNXRUNTIME_LIB to the file, or put " MAQ_ONNXRUNTIME_FILE " in the folder of " MAQ_LIBRARY_FILE ".";
 
 // The named file, which must open, or otherwise the first of the usual files that opens.
 void* find_library(const std::string& explicit_path, std::string* opened_path) {
@@ -116,9 +115,7 @@ std::string without_source_place(const char* given) {
 }
 
 OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string& explicit_path, const Log& log) : log_(log) {
-  // Releases after 1.26 carry telemetry that starts when the library is loaded; this keeps it off. It does not
-  // overwrite a choice that the process already made.
-  setenv("ORT_DISABLE_TELEMETRY", "1", 0);
+  keep_telemetry_off();
 
   // Not closed again once it started: its threads and thread-local storage do not survive unloading.
   library_ = find_library(explicit_path, &path_);
@@ -150,11 +147,12 @@ void OnnxRuntimeLibrary::start() {
     });
     if (!printed.empty()) log_.write(MAQ_LOG_WARNING, "ONNX Runtime printed while it started: ", printed);
     check(status, MAQ_ERROR_RUNTIME_LIBRARY, "ONNX Runtime does not start");
+    end_telemetry(*api_, env_);
     if (says_out_of_memory(printed)) throw std::bad_alloc();  // it has not all of its operators
   } catch (...) {
     // Half started, it would fail at each later start. It has no threads yet, so that it can be closed and opened anew.
     if (env_ != nullptr) api_->ReleaseEnv(env_);
-    dlclose(library_);
+    close_library(library_);
     throw;
   }
 }
@@ -163,7 +161,7 @@ OnnxRuntimeLibrary::~OnnxRuntimeLibrary() {
   if (env_ != nullptr) api_->ReleaseEnv(env_);
 }
 
-void* OnnxRuntimeLibrary::symbol(const char* name) const { return dlsym(library_, name); }
+void* OnnxRuntimeLibrary::symbol(const char* name) const { return find_symbol(library_, name); }
 
 void OnnxRuntimeLibrary::check(OrtStatus* result, maq_status status, const std::string& what) const {
   if (result == nullptr) return;

@@ -1,11 +1,5 @@
 #include "pipeline/pipeline.h"
 
-#if defined(__linux__)
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-#endif
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -22,6 +16,7 @@
 #include "core/error.h"
 #include "core/thread.h"
 #include "core/trace/trace_section.h"
+#include "pipeline/thread_priority.h"
 #include "sources/recording/recording.h"
 #include "sources/registry.h"
 
@@ -36,17 +31,6 @@ constexpr size_t kMaxReports = 1000;  // that wait for a callback that hangs
 
 double ms_between(Clock::time_point begin, Clock::time_point end) {
   return std::chrono::duration<double, std::milli>(end - begin).count();
-}
-
-// Threads that this one starts inherit it.
-void lower_priority_of_this_thread(int nice) {
-#if defined(__linux__)
-  if (nice == 0) return;
-  const id_t thread = id_t(syscall(SYS_gettid));
-  setpriority(PRIO_PROCESS, thread, std::min(19, getpriority(PRIO_PROCESS, thread) + nice));
-#else
-  (void)nice;
-#endif
 }
 
 // How many events a second there were lately.

@@ -11,7 +11,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
-#include "core/files/unique_fd.h"
+#include "core/files/event_fd.h"
 #include "core/rounding.h"
 #include "core/thread.h"
 #include "image/depth.h"

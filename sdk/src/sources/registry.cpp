@@ -5,19 +5,22 @@
 
 #include "core/error.h"
 #include "core/files/file.h"
-#include "sources/android/camera2_camera.h"
 #include "sources/calibration_options.h"
 #include "sources/control_options.h"
-#include "sources/depthai/depthai_backend.h"
 #include "sources/files/file_sources.h"
-#include "sources/libcamera/module_client.h"
 #include "sources/live_source.h"
 #include "sources/recording/recording.h"
 #include "sources/synthetic/fault_injection.h"
 #include "sources/synthetic/replay_camera.h"
 #include "sources/synthetic/stub_source.h"
 #include "sources/uri.h"
+#if defined(__ANDROID__)
+#include "sources/android/camera2_camera.h"
+#elif !defined(_WIN32)
+#include "sources/depthai/depthai_backend.h"
+#include "sources/libcamera/module_client.h"
 #include "sources/v4l2/v4l2_camera.h"
+#endif
 
 namespace maq {
 namespace {
@@ -62,7 +65,7 @@ const Entry kEntries[] = {
       "a camera of Android (Camera2), by number, id or direction: back, front or external"},
      nullptr,
      android_uri_opener},
-#else
+#elif !defined(_WIN32)
     {{"v4l2", "v4l2:/dev/video0?size=640x480&fps=30",
       "a camera on Linux (Video4Linux2); takes the nearest size and rate that it offers; ?format=MJPG&exposure=10000 "
       "(microseconds); ?format=Z16&depth_unit=0.001&fov=60: depth"},
@@ -172,7 +175,7 @@ std::unique_ptr<Source> open_path(const std::string& path, const SourceSettings&
     return open_entry(*entry, std::move(uri), settings);
   }
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
+  if (!std::filesystem::exists(std::filesystem::u8path(path), error)) {
     throw Error(MAQ_ERROR_NOT_FOUND, path,
                 " does not exist; check the path, or write scheme:target, as in stub:people or camera:.");
   }
@@ -219,6 +222,8 @@ const std::vector<SourceScheme>& source_schemes() {
 std::vector<CameraListing> list_cameras() {
 #ifdef __ANDROID__
   return list_android_cameras();
+#elif defined(_WIN32)
+  return {};
 #else
   std::vector<CameraListing> all = list_v4l2_cameras(SystemCalls::real());
   for (CameraListing& camera : list_libcamera_cameras()) all.push_back(std::move(camera));

@@ -5,15 +5,16 @@
 #include <maquette/maquette.hpp>
 #include <stdexcept>
 
+#include "own_program.h"
+
 namespace fs = std::filesystem;
 
 namespace {
 
 // Returns where the bundle lies when it is installed with this program; "" where the system hides the program's path.
 fs::path place_of(const SystemNetworks& networks) {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (error) return {};
+  const fs::path program = own_program_path();
+  if (program.empty()) return {};
   return program.parent_path().parent_path() / "share/maquette/models" / networks.bundle;
 }
 

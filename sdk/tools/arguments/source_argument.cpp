@@ -40,21 +40,21 @@ SourceArgument parse_source_argument(const std::string& text) {
   const size_t colon = text.find(':');
   const std::string scheme = colon == std::string::npos ? "" : text.substr(0, colon);
   for (const char* cameras : {"/dev/video", "/dev/v4l/"}) {
-    if (text.rfind(cameras, 0) == 0) return {"v4l2:" + escaped(text), "v4l2_" + fs::path(text).stem().string()};
+    if (text.rfind(cameras, 0) == 0) return {"v4l2:" + escaped(text), "v4l2_" + fs::u8path(text).stem().string()};
   }
   std::error_code error;
-  if (!is_known_scheme(scheme) && fs::exists(text, error)) {
-    if (fs::is_directory(text, error)) {
+  if (!is_known_scheme(scheme) && fs::exists(fs::u8path(text), error)) {
+    if (fs::is_directory(fs::u8path(text), error)) {
       throw std::runtime_error(text + " is a folder; name the files in it, as in " + text + "/*.jpg.");
     }
-    return {"file:" + escaped(text), fs::path(text).stem().string()};
+    return {"file:" + escaped(text), fs::u8path(text).stem().string()};
   }
   if (scheme.empty()) {
     throw std::runtime_error(text + " does not exist; check the path, or list other sources with `maquette sources`.");
   }
   const std::string target = text.substr(colon + 1, text.find('?', colon) - colon - 1);
   if (scheme == "file" || scheme == "image" || scheme == "video" || scheme == "rec")
-    return {text, fs::path(target).stem().string()};
+    return {text, fs::u8path(target).stem().string()};
   std::string stem = scheme + "_" + target;
   std::replace_if(
       stem.begin(), stem.end(), [](unsigned char c) { return std::isalnum(c) == 0; }, '_');

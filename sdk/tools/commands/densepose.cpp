@@ -107,7 +107,7 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
   densepose.reset();
   const bool of_clip = is_clip(source);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"),
+  ClipFile clip(context, fs::u8path(options.out) / fs::u8path(argument.stem + "_overlay.mp4"),
                 source.info().fps / double(options.limits.every));
   const auto work = [&](const SourceFrame& given) {
     const maquette::DensePoseResult result = densepose.run(given.frame);
@@ -121,11 +121,11 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
                                                                    : MAQ_DENSEPOSE_COLOURS_MAGICANIMATE);
     }
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
-    make_folder_of(fs::path(options.out) / (given.stem + "_IUV.png"));
-    result.save((fs::path(options.out) / given.stem).string());
+    make_folder_of(fs::u8path(options.out) / fs::u8path(given.stem + "_IUV.png"));
+    result.save((fs::u8path(options.out) / fs::u8path(given.stem)).string());
     if (options.overlay && of_clip) clip.add(overlay);
     if (options.overlay && !of_clip) {
-      frame_of(context, overlay).save((fs::path(options.out) / (given.stem + "_overlay.png")).string());
+      frame_of(context, overlay).save((fs::u8path(options.out) / fs::u8path(given.stem + "_overlay.png")).string());
     }
     timings.add(stats);
     if (!of_clip || options.json) print_frame(options, given.stem, given.frame.desc(), stats);
@@ -134,7 +134,7 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
   const int64_t done = run_frames(argument, source, options.limits, options.json, work);
   const fs::path overlay_path = clip.finish();
   if (!overlay_path.empty() && !options.json) {
-    print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
+    print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.string().c_str());
   } else if (of_clip && !options.json) {
     print_output("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
   }

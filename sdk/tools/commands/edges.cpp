@@ -141,7 +141,7 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
                 maquette::Source& source, maquette::Edges& edges) {
   require_intrinsics(argument, source);
   const bool of_clip = is_clip(source);
-  ClipFile clip(context, fs::path(options.out) / (argument.stem + "_overlay.mp4"),
+  ClipFile clip(context, fs::u8path(options.out) / fs::u8path(argument.stem + "_overlay.mp4"),
                 source.info().fps / double(options.limits.every));
   const bool prints = !of_clip || options.json || options.boxes;
   const auto work = [&](const SourceFrame& given) {
@@ -151,14 +151,14 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
     Canvas overlay = options.overlay ? draw_edge_overlay(result, found.curves, found.corners, found.boxes) : Canvas();
     if (options.overlay) draw_prediction_mark(given.frame, overlay);
     if (!options.out.empty()) {
-      const fs::path path = fs::path(options.out) / given.stem;
+      const fs::path path = fs::u8path(options.out) / fs::u8path(given.stem);
       make_folder_of(path);
       result.save(path.string());
       for (const std::string& format : options.formats) found.all->save(path.string() + "_curves." + format);
     }
     if (options.overlay && of_clip) clip.add(overlay);
     if (options.overlay && !of_clip) {
-      frame_of(context, overlay).save((fs::path(options.out) / (given.stem + "_overlay.png")).string());
+      frame_of(context, overlay).save((fs::u8path(options.out) / fs::u8path(given.stem + "_overlay.png")).string());
     }
     if (prints) print_frame(options, given.stem, given.frame.desc(), result, found);
     return std::to_string(int(result.stats().total_ms + 0.5f)) + " ms";
@@ -166,7 +166,7 @@ void run_source(const EdgesOptions& options, const SourceArgument& argument, con
   const int64_t done = run_frames(argument, source, options.limits, prints, work);
   const fs::path overlay_path = clip.finish();
   if (!overlay_path.empty() && !options.json) {
-    print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.c_str());
+    print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.string().c_str());
   } else if (of_clip && !options.json) {
     print_output("%s  %lld frames\n", argument.stem.c_str(), (long long)done);
   }

@@ -23,7 +23,7 @@ struct InfoOptions {
 
 // Reads the manifest of a bundle that the library has checked.
 nlohmann::ordered_json describe(const std::string& bundle) {
-  std::ifstream file(fs::path(bundle) / "manifest.json");
+  std::ifstream file(fs::u8path(bundle) / "manifest.json");
   const nlohmann::ordered_json manifest = nlohmann::ordered_json::parse(file);
   uint64_t bytes = 0;
   for (const auto& entry : manifest.at("files")) bytes += entry.at("bytes").get<uint64_t>();

@@ -30,7 +30,7 @@ bool print_networks() {
     const std::string bundle = default_bundle(networks);
     std::error_code error;
     std::string text = bundle.empty() ? "not installed; `maquette doctor` says how to install them" : bundle;
-    if (!bundle.empty() && !std::filesystem::exists(std::filesystem::path(bundle) / "manifest.json", error)) {
+    if (!bundle.empty() && !std::filesystem::exists(std::filesystem::u8path(bundle) / "manifest.json", error)) {
       text = "missing: " + bundle + " has no manifest.json; see " + networks.variable;
       are_there = false;
     }

@@ -109,7 +109,7 @@ std::vector<uint32_t> chosen_views(const maquette::Capture& capture, const std::
   return chosen;
 }
 
-std::string image_name(const maq_capture_view& view) { return fs::path(view.name).stem().string() + ".png"; }
+std::string image_name(const maq_capture_view& view) { return fs::u8path(view.name).stem().string() + ".png"; }
 
 int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& capture, const RenderOptions& options) {
   const std::vector<uint32_t> views = chosen_views(capture, options.views);
@@ -123,7 +123,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     }
   }
   std::error_code error;
-  fs::create_directories(options.out, error);
+  fs::create_directories(fs::u8path(options.out), error);
   if (error) throw std::runtime_error(options.out + " cannot be made: " + error.message() + ".");
   nlohmann::ordered_json document;
   document["views"] = nlohmann::json::array();
@@ -134,7 +134,7 @@ int render_views(maquette::SceneRenderer& renderer, const maquette::Capture& cap
     nlohmann::ordered_json ms;
     const maquette::Image image = timed(renderer, camera, options.repeat, ms);
     const maq_scene_render_stats stats = image.scene_stats();
-    image.save((fs::path(options.out) / image_name(view)).string(),
+    image.save((fs::u8path(options.out) / fs::u8path(image_name(view))).string(),
                options.no_alpha ? MAQ_IMAGE_ALPHA_OFF : MAQ_IMAGE_ALPHA_ON);
     document["views"].push_back({{"name", view.name},
                                  {"ms", ms},

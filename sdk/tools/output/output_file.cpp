@@ -14,10 +14,12 @@ void make_folder_of(const fs::path& path) {
   if (error) throw std::runtime_error(path.string() + " cannot be written: " + error.message() + ".");
 }
 
+void make_folder_of(const std::string& path) { make_folder_of(fs::u8path(path)); }
+
 void require_writable(const std::string& path) {
   if (path.empty()) return;
   std::error_code error;
-  if (fs::is_directory(path, error)) throw std::runtime_error(path + " is a folder; name a file in it.");
+  if (fs::is_directory(fs::u8path(path), error)) throw std::runtime_error(path + " is a folder; name a file in it.");
   const maq::AtomicFile probe(path);
 }
 

@@ -7,6 +7,7 @@
 
 // Makes the folder of `path` when it is not there. Throws std::runtime_error.
 void make_folder_of(const std::filesystem::path& path);
+void make_folder_of(const std::string& path);  // in UTF-8, as all texts that name files
 
 // Before long work: that its result can be written; "" has no result. Makes no folder. Throws std::runtime_error.
 void require_writable(const std::string& path);

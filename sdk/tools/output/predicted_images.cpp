@@ -16,7 +16,7 @@ constexpr double kMaxArea_px = 64e6;  // of a frame of the SDK
 
 PredictedImages::PredictedImages(const maquette::Context& context, const std::string& out, const std::string& stem,
                                  double fps)
-    : context_(context), out_(out), stem_(stem) {
+    : context_(context), out_(std::filesystem::u8path(out)), stem_(stem) {
   if (out.empty()) return;
   const std::string extension = out_.extension().string();
   if (extension == ".mp4") {
@@ -43,7 +43,7 @@ void PredictedImages::save(int64_t number, const maquette::Frame& frame, const C
   char name[64];
   const int length = std::snprintf(name, sizeof name, "_ahead_%03lld", (long long)number);
   std::snprintf(name + length, sizeof name - size_t(length), sample < 0 ? ".png" : "_sample_%02d.png", sample + 1);
-  const std::filesystem::path path = out_ / (stem_ + name);
+  const std::filesystem::path path = out_ / std::filesystem::u8path(stem_ + name);
   make_folder_of(path);
   if (compared != nullptr) {
     frame_of(context_, *compared).save(path.string());

@@ -1,23 +1,17 @@
 #include "output/progress_bar.h"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
 
 #include "print.h"
+#include "terminal_size.h"
 
 namespace {
 
 constexpr int kWidth = 30;  // of the bar, in columns; less in a narrow terminal
 constexpr std::chrono::milliseconds kRedraw{80};
-constexpr int kUnknownColumns = 80;
-
-int terminal_columns() {
-  winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUnknownColumns;
-}
 
 // Returns the first letters of UTF-8 text.
 std::string beginning_of(const std::string& text, int letters) {
@@ -47,7 +41,7 @@ void ProgressBar::advance(int64_t done, const std::string& note) {
   drawn_ = true;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
   // The last column stays free: some terminals begin a new line after it.
-  const int columns = terminal_columns();
+  const int columns = terminal_size(STDERR_FILENO).columns;
   const std::string shown = beginning_of(text(done, note, elapsed_s, std::min(kWidth, columns / 3)), columns - 1);
   std::fprintf(stderr, "\r%s\x1b[K", shown.c_str());
   std::fflush(stderr);

@@ -1,6 +1,5 @@
 #include "output/terminal_picture.h"
 
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,16 +10,11 @@
 #include <cstring>
 
 #include "print.h"
+#include "terminal_size.h"
 
 namespace {
 
 constexpr int kMaxColumns = 100;
-
-winsize terminal_size() {
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) size = {24, 80, 0, 0};
-  return size;
-}
 
 // In grey, near things bright: by inverse depth, from the nearest. Black where nothing is known.
 void draw_depth(const maq_frame_desc& depth, uint8_t* rgb) {
@@ -62,9 +56,9 @@ void TerminalPicture::show(const maquette::Frame& frame, const std::string& line
   }
 
   // Characters are about twice as high as they are wide, so that half of one is a square pixel.
-  const winsize size = terminal_size();
-  const double scale = std::min({double(std::min<int>(size.ws_col, kMaxColumns)) / desc.width_px,
-                                 2.0 * std::max(1, size.ws_row - 2) / desc.height_px, 1.0});
+  const TerminalSize size = terminal_size(STDOUT_FILENO);
+  const double scale = std::min({double(std::min(size.columns, kMaxColumns)) / desc.width_px,
+                                 2.0 * std::max(1, size.rows - 2) / desc.height_px, 1.0});
   const int columns = std::max(1, int(desc.width_px * scale));
   const int rows = std::max(1, int(desc.height_px * scale / 2));
   const auto pixel = [&](int column, int half_row) {

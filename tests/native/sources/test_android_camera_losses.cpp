@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "core/files/unique_fd.h"
+#include "core/files/event_fd.h"
 #include "sources/android/camera2_errors.h"
 #include "support/source_threads.h"
 

@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/files/blocked_write_signals.h"
+#include "core/files/file_calls.h"
 
 namespace maq {
 namespace {
@@ -60,9 +61,6 @@ std::string random_digits() {
   std::snprintf(digits, sizeof digits, "%08x%08x", random(), random());
   return digits;
 }
-
-// False where the data is not on the disk. File systems without fsync() have done what they can.
-bool synchronise(int file) { return ::fsync(file) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP; }
 
 }  // namespace
 

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "core/clock.h"
@@ -124,15 +123,6 @@ bool stays_inside(const std::string& relative_path) {
   if (relative_path.find('\0') != std::string::npos) return false;
   const std::string parts = "/" + relative_path + "/";
   return parts.find("/../") == std::string::npos;
-}
-
-std::string lower_case_extension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  // ASCII, whatever the locale of the process.
-  for (char& letter : extension) {
-    if (letter >= 'A' && letter <= 'Z') letter = char(letter - 'A' + 'a');
-  }
-  return extension;
 }
 
 OpenFile open_file(const std::string& path) {

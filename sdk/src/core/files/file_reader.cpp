@@ -1,11 +1,10 @@
 #include "core/files/file_reader.h"
 
-#include <unistd.h>
-
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+
+#include "core/files/file_calls.h"
 
 namespace maq {
 namespace {
@@ -24,9 +23,7 @@ bool FileReader::fill() {
   position_ = filled_ = 0;
   const size_t count = size_t(std::min<uint64_t>(kBufferBytes, file_.size_bytes - buffer_offset_));
   while (filled_ < count) {
-    const ssize_t got =
-        ::pread(file_.fd.get(), buffer_.get() + filled_, count - filled_, off_t(buffer_offset_ + filled_));
-    if (got < 0 && errno == EINTR) continue;
+    const ptrdiff_t got = read_at(file_.fd.get(), buffer_offset_ + filled_, buffer_.get() + filled_, count - filled_);
     if (got <= 0) fail(" cannot be read to its end; did it change meanwhile?");
     filled_ += size_t(got);
   }

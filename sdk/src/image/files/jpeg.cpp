@@ -13,6 +13,11 @@
 #include "image/files/image_header.h"
 
 namespace maq {
+namespace {
+
+using JpegSize = unsigned long;  // of the library's interface; 32 bits on Windows, more than any file that is read
+
+}  // namespace
 
 JpegDecoder::~JpegDecoder() {
   if (decoder_ != nullptr) tjDestroy(decoder_);
@@ -32,12 +37,14 @@ bool JpegDecoder::decode(const uint8_t* bytes, size_t size_bytes, int64_t max_pi
 
 bool JpegDecoder::decode_by_library(const uint8_t* bytes, size_t size_bytes, int64_t max_pixels, Frame& frame) {
   int width = 0, height = 0, subsampling = 0, colours = 0;
-  if (tjDecompressHeader3(decoder_, bytes, size_bytes, &width, &height, &subsampling, &colours) != 0) return false;
+  if (tjDecompressHeader3(decoder_, bytes, JpegSize(size_bytes), &width, &height, &subsampling, &colours) != 0)
+    return false;
   if (width < 1 || height < 1 || width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX) return false;
   if (int64_t(width) * height > std::min<int64_t>(max_pixels, MAQ_MAX_PIXELS)) return false;
   uint8_t* pixels = frame.allocate_bgr(width, height);
   // A truncated frame is only a warning to the library, which fills the rest with grey.
-  return tjDecompress2(decoder_, bytes, size_bytes, pixels, width, width * 3, height, TJPF_BGR, TJFLAG_FASTDCT) == 0;
+  return tjDecompress2(decoder_, bytes, JpegSize(size_bytes), pixels, width, width * 3, height, TJPF_BGR,
+                       TJFLAG_FASTDCT) == 0;
 }
 
 namespace {
@@ -66,7 +73,7 @@ JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& fra
   };
   int width = 0, height = 0, subsampling = 0, colours = -1;
   // The result is also an error for subsamplings without a name, which can be decoded.
-  tjDecompressHeader3(decoder.get(), bytes, size_bytes, &width, &height, &subsampling, &colours);
+  tjDecompressHeader3(decoder.get(), bytes, JpegSize(size_bytes), &width, &height, &subsampling, &colours);
   if (width < 1 || height < 1 || colours < 0) return failure();
   if (width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX || int64_t(width) * height > MAQ_MAX_PIXELS) {
     return JpegResult::kDamaged;
@@ -74,8 +81,8 @@ JpegResult decode_jpeg_photo(const uint8_t* bytes, size_t size_bytes, Frame& fra
   const bool is_cmyk = colours == TJCS_CMYK || colours == TJCS_YCCK;
   uint8_t* bgr = frame.allocate_bgr(width, height);
   std::vector<uint8_t> cmyk(is_cmyk ? size_t(width) * size_t(height) * 4 : 0);
-  const int result = tjDecompress2(decoder.get(), bytes, size_bytes, is_cmyk ? cmyk.data() : bgr, width, 0, height,
-                                   is_cmyk ? TJPF_CMYK : TJPF_BGR, TJFLAG_LIMITSCANS);
+  const int result = tjDecompress2(decoder.get(), bytes, JpegSize(size_bytes), is_cmyk ? cmyk.data() : bgr, width, 0,
+                                   height, is_cmyk ? TJPF_CMYK : TJPF_BGR, TJFLAG_LIMITSCANS);
   if (result != 0 && tjGetErrorCode(decoder.get()) != TJERR_WARNING) return failure();
   if (result != 0 && is_cut(decoder.get(), bytes, size_bytes)) return JpegResult::kTruncated;
   if (is_cmyk) cmyk_to_bgr(cmyk.data(), size_t(width) * size_t(height), bgr);
@@ -90,7 +97,7 @@ void compress(tjhandle encoder, const ImageView& image, int quality, int flags, 
   const int subsampling = is_grey ? TJSAMP_GRAY : TJSAMP_420;
   bytes.resize(tjBufSize(image.width_px, image.height_px, subsampling));
   uint8_t* target = bytes.data();
-  unsigned long size_bytes = bytes.size();
+  JpegSize size_bytes = JpegSize(bytes.size());
   if (tjCompress2(encoder, image.planes[0].data, image.width_px, int(image.planes[0].stride_bytes), image.height_px,
                   is_grey ? TJPF_GRAY : TJPF_BGR, &target, &size_bytes, subsampling, quality,
                   flags | TJFLAG_NOREALLOC) != 0) {

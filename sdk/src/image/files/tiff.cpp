@@ -112,8 +112,8 @@ void unpack_bits(const uint8_t* in, size_t size, std::vector<uint8_t>& out) {
 }
 
 void inflate_all(const uint8_t* in, size_t size, std::vector<uint8_t>& out) {
-  uLongf to = out.size();
-  const int status = uncompress(out.data(), &to, in, size);
+  uLongf to = uLongf(out.size());
+  const int status = uncompress(out.data(), &to, in, uLong(size));
   if (status == Z_MEM_ERROR) throw std::bad_alloc();
   if ((status != Z_OK && status != Z_BUF_ERROR) || to != out.size()) throw Damage();
 }
@@ -332,9 +332,9 @@ std::vector<uint8_t> encode_depth_tiff(const ImageView& depth) {
   const auto put = [&](uint64_t value, size_t size) {
     for (size_t i = 0; i < size; ++i) bytes.push_back(uint8_t(value >> 8 * i));
   };
-  uLongf packed = compressBound(rows.size());
+  uLongf packed = compressBound(uLong(rows.size()));
   std::vector<uint8_t> pixels(packed);
-  if (compress2(pixels.data(), &packed, rows.data(), rows.size(), Z_BEST_SPEED) != Z_OK) throw std::bad_alloc();
+  if (compress2(pixels.data(), &packed, rows.data(), uLong(rows.size()), Z_BEST_SPEED) != Z_OK) throw std::bad_alloc();
   const std::pair<Tag, uint32_t> entries[] = {{kWidth, width},
                                               {kHeight, height},
                                               {kBits, 32},

@@ -1,9 +1,6 @@
-#include <sys/mman.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -11,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/files/file.h"
+#include "core/files/file_calls.h"
 #include "scene/format/scene.h"
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
@@ -108,8 +106,7 @@ void SceneFileReader::read_at(uint64_t offset, void* bytes, size_t count) const 
   }
   auto* to = static_cast<char*>(bytes);
   while (count > 0) {
-    const ssize_t got = ::pread(file_.get(), to, count, off_t(offset));
-    if (got < 0 && errno == EINTR) continue;
+    const ptrdiff_t got = maq::read_at(file_.get(), offset, to, count);
     if (got <= 0) fail(" cannot be read at byte ", offset, "; did it change meanwhile?");
     to += got;
     offset += uint64_t(got);
@@ -173,13 +170,12 @@ void SceneFileReader::check_head(uint64_t size_bytes) const {
 
 std::shared_ptr<const uint8_t> SceneFileReader::map() const {
   const size_t bytes = size_t(head_.file_bytes);
-  void* const at =
-      bytes == head_.file_bytes ? ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file_.get(), 0) : MAP_FAILED;
-  if (at == MAP_FAILED) {
+  std::shared_ptr<const uint8_t> at;
+  if (bytes == head_.file_bytes) at = map_file(file_.get(), bytes);
+  if (at == nullptr) {
     throw Error(MAQ_ERROR_OUT_OF_MEMORY, path_, " cannot be mapped into memory: it has ", head_.file_bytes, " bytes.");
   }
-  return {static_cast<const uint8_t*>(at),
-          [bytes](const uint8_t* from) { ::munmap(const_cast<uint8_t*>(from), bytes); }};
+  return at;
 }
 
 // Checks what the renderer relies on: blocks follow each other without gaps, and decoded numbers are finite.

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <mutex>
 
-#include "core/files/unique_fd.h"
+#include "core/files/event_fd.h"
 #include "sources/android/camera2_functions.h"
 
 namespace maq {

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <optional>
 
-#include "core/files/unique_fd.h"
+#include "core/files/event_fd.h"
 #include "sources/depthai/depthai_pairing.h"
 
 namespace maq {

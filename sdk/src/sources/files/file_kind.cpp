@@ -16,14 +16,14 @@ namespace fs = std::filesystem;
 namespace maq {
 
 const char* scheme_of_file(const std::string& path) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) {
+  if (is_folder(path)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, path, " is a folder; name a file in it.");
   }
-  if (!fs::is_regular_file(path, error)) return "image";
+  std::error_code error;
+  if (!fs::is_regular_file(fs::u8path(path), error)) return "image";
   constexpr size_t kHeadBytes = 1024;
   std::vector<uint8_t> head(kHeadBytes);
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file(fs::u8path(path), std::ios::binary);
   file.read(reinterpret_cast<char*>(head.data()), std::streamsize(head.size()));
   head.resize(size_t(file.gcount()));
   const std::string magic = "MAQREC";

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/files/unique_fd.h"
+#include "core/files/event_fd.h"
 
 namespace maq {
 

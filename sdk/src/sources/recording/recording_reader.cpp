@@ -1,8 +1,6 @@
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -10,6 +8,7 @@
 #include "core/checked_arithmetic.h"
 #include "core/error.h"
 #include "core/files/file.h"
+#include "core/files/file_calls.h"
 #include "core/json/json_value.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
@@ -96,8 +95,7 @@ bool RecordingReader::read_at(uint64_t offset, void* bytes, size_t size_bytes) c
   if (offset > size_bytes_ || size_bytes > size_bytes_ - offset) return false;
   auto* to = static_cast<uint8_t*>(bytes);
   while (size_bytes > 0) {
-    const ssize_t got = ::pread(file_.get(), to, size_bytes, off_t(offset));
-    if (got < 0 && errno == EINTR) continue;
+    const ptrdiff_t got = maq::read_at(file_.get(), offset, to, size_bytes);
     if (got <= 0) return false;  // also when the file became shorter meanwhile
     to += got;
     offset += uint64_t(got);
@@ -174,10 +172,10 @@ void RecordingReader::scan_for_frames() {
       continue;
     }
     // Nothing is in a hole of the file, which may be of any length.
-    const off_t data = ::lseek(file_.get(), off_t(offset + 1), SEEK_DATA);
-    if (data < 0 && errno == ENXIO) return;
-    if (data > off_t(offset + 1)) {
-      offset = uint64_t(data);
+    const uint64_t data = next_data(file_.get(), offset + 1);
+    if (data == UINT64_MAX) return;
+    if (data > offset + 1) {
+      offset = data;
       continue;
     }
     const size_t size = size_t(std::min<uint64_t>(window.size(), size_bytes_ - offset - 1));

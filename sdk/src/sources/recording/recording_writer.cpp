@@ -1,6 +1,3 @@
-#include <fcntl.h>
-#include <sys/uio.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -10,7 +7,7 @@
 
 #include "core/build_info.h"
 #include "core/error.h"
-#include "core/files/blocked_write_signals.h"
+#include "core/files/file_calls.h"
 #include "core/json/json_text.h"
 #include "sources/recording/recording.h"
 #include "sources/recording/recording_format.h"
@@ -42,7 +39,7 @@ std::string head_json(const RecordingInfo& info) {
 
 RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, int jpeg_quality, bool keeps_predicted)
     : path_(std::move(path)),
-      file_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644)),
+      file_(make_new_file(path_)),
       jpeg_quality_(jpeg_quality),
       keeps_predicted_(keeps_predicted) {
   if (!file_.is_open()) {
@@ -58,43 +55,26 @@ RecordingWriter::RecordingWriter(std::string path, const RecordingInfo& info, in
   try {
     append(&head, sizeof head, json.data(), json.size());
   } catch (...) {
-    ::unlink(path_.c_str());  // the destructor does not run
+    file_.reset();
+    remove_file(path_);  // the destructor does not run
     throw;
   }
 }
 
 RecordingWriter::~RecordingWriter() {
   // A file without a frame cannot be played, and its name would be taken.
-  if (file_.is_open() && entries_.empty()) ::unlink(path_.c_str());
+  if (!file_.is_open() || !entries_.empty()) return;
+  file_.reset();
+  remove_file(path_);
 }
 
 void RecordingWriter::append(const void* header, size_t header_bytes, const void* payload, size_t payload_bytes) {
-  const BlockedWriteSignals blocked;
-  iovec parts[2] = {{const_cast<void*>(header), header_bytes}, {const_cast<void*>(payload), payload_bytes}};
-  iovec* part = parts;
-  int left = 2;
-  while (left > 0) {
-    if (part->iov_len == 0) {
-      ++part;
-      --left;
-      continue;
-    }
-    ssize_t written = ::writev(file_.get(), part, left);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) {
-      const int error = written < 0 ? errno : ENOSPC;
-      // Removes the incomplete frame, so that the file ends with a whole frame and the next try begins there.
-      [[maybe_unused]] const bool cut =
-          ::ftruncate(file_.get(), off_t(size_bytes_)) == 0 && ::lseek(file_.get(), off_t(size_bytes_), SEEK_SET) >= 0;
-      throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be written: ", std::strerror(error), ". The ", entries_.size(),
-                  " frames before are whole.");
-    }
-    for (int i = 0; i < left && written > 0; ++i) {
-      const size_t done = std::min(size_t(written), part[i].iov_len);
-      part[i].iov_base = static_cast<uint8_t*>(part[i].iov_base) + done;
-      part[i].iov_len -= done;
-      written -= ssize_t(done);
-    }
+  if (!write_parts(file_.get(), header, header_bytes, payload, payload_bytes)) {
+    const int error = errno;
+    // Removes the incomplete frame, so that the file ends with a whole frame and the next try begins there.
+    cut_file(file_.get(), size_bytes_);
+    throw Error(MAQ_ERROR_UNWRITABLE, path_, " cannot be written: ", std::strerror(error), ". The ", entries_.size(),
+                " frames before are whole.");
   }
   size_bytes_ += header_bytes + payload_bytes;
 }
@@ -159,7 +139,7 @@ void RecordingWriter::finish() {
   std::memcpy(tail.magic, kRecordingEnd, sizeof tail.magic);
   append(entries_.data(), index_bytes, &tail, sizeof tail);
   finished_ = true;
-  if (::fsync(file_.get()) != 0 && errno != EINVAL && errno != EROFS) {
+  if (!synchronise(file_.get())) {
     throw Error(MAQ_ERROR_UNWRITABLE, path_, " did not reach the disk: ", std::strerror(errno), ".");
   }
   file_.reset();

@@ -1,7 +1,5 @@
 #include "sources/synthetic/fault_injection.h"
 
-#include <poll.h>
-
 #include <algorithm>
 #include <chrono>
 #include <climits>
@@ -11,6 +9,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/files/event_fd.h"
 
 namespace maq {
 namespace {
@@ -117,9 +116,7 @@ class FaultyCamera : public Camera {
   // Delays by a random time; true when woken before.
   bool delay(int wake_fd) {
     const int64_t late_ns = std::uniform_int_distribution<int64_t>(0, timeline_->plan.jitter_ns)(timeline_->random);
-    pollfd wake{wake_fd, POLLIN, 0};
-    const timespec time{late_ns / 1000000000, late_ns % 1000000000};
-    return ::ppoll(&wake, 1, &time, nullptr) > 0;
+    return wait_for_event(wake_fd, late_ns);
   }
 
   void damage(CameraBuffer& buffer) {

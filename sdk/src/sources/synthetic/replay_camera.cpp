@@ -1,7 +1,5 @@
 #include "sources/synthetic/replay_camera.h"
 
-#include <poll.h>
-
 #include <algorithm>
 #include <chrono>
 #include <mutex>
@@ -9,6 +7,7 @@
 
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/files/event_fd.h"
 
 namespace maq {
 namespace {
@@ -156,9 +155,7 @@ class ReplayCamera : public Camera {
   // True when woken before.
   static bool sleep_until(int wake_fd, Clock::time_point time) {
     const int64_t left_ns = std::max<int64_t>(0, nanoseconds(time - Clock::now()).count());
-    pollfd wake{wake_fd, POLLIN, 0};
-    const timespec left{left_ns / 1000000000, left_ns % 1000000000};
-    return ::ppoll(&wake, 1, &left, nullptr) > 0;
+    return wait_for_event(wake_fd, left_ns);
   }
 
   int free_slot() {

@@ -169,9 +169,9 @@ void find_heads(const HeadOptions& options, const maquette::Context& context, st
 // head.glb -> head_2.glb.
 std::string with_number(const std::string& path, size_t number) {
   if (path.empty()) return path;
-  const fs::path given(path);
-  return (given.parent_path() / (given.stem().string() + "_" + std::to_string(number) + given.extension().string()))
-      .string();
+  const fs::path given = fs::u8path(path);
+  const std::string name = given.stem().string() + "_" + std::to_string(number) + given.extension().string();
+  return (given.parent_path() / fs::u8path(name)).string();
 }
 
 std::vector<Task> tasks_of(const HeadOptions& options, const std::vector<Photo>& photos) {
@@ -436,7 +436,7 @@ int run_head(const HeadOptions& options) {
 }
 
 std::string check_mesh_name(const std::string& path) {
-  const std::string ending = fs::path(path).extension().string();
+  const std::string ending = fs::u8path(path).extension().string();
   return ending == ".glb" || ending == ".obj" || ending == ".ply" ? std::string()
                                                                   : path + " must end with .glb, .obj or .ply";
 }

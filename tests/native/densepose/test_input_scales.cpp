@@ -55,10 +55,12 @@ TEST(InputScales, AStreamStaysAtTheLargerInputWhilePeopleAreSmall) {
   for (int frame = 0; frame < 64; ++frame) {
     const bool near = scales.runs_near();
     both += near ? 1 : 0;
-    if (near) ASSERT_TRUE(scales.runs_far(people_of({60})));
+    if (near) {
+      ASSERT_TRUE(scales.runs_far(people_of({60})));
+    }
     scales.judge(people_of({60, 50}), near);
   }
-  EXPECT_EQ(both, 3) << "a look at the smaller input now and then";
+  EXPECT_EQ(both, 4) << "a look at the smaller input in each 16th frame";
 }
 
 TEST(InputScales, AStreamLeavesTheLargerInputOnceNobodyIsSmall) {
@@ -66,7 +68,7 @@ TEST(InputScales, AStreamLeavesTheLargerInputOnceNobodyIsSmall) {
   scales.set_stream(true);
   scales.runs_far(people_of({60}));
   scales.judge(people_of({60}), true);
-  scales.judge(people_of({120}), false);
+  scales.judge(people_of({105}), false);
   EXPECT_FALSE(scales.runs_near()) << "hysteresis: larger than small, but not by much";
   scales.judge(people_of({160}), false);
   ASSERT_TRUE(scales.runs_near());

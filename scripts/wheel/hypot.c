@@ -1,7 +1,7 @@
 #include <math.h>
 
-/* hypot as glibc 2.35 and later have it, so that results are the same on all systems (C. F. Borges, "An improved algorithm
- * for hypot(a,b)", 2019). Arguments far from 1 are scaled. */
+/* hypot as glibc 2.35 and later have it, so that results are the same on all systems (C. F. Borges, "An improved
+ * algorithm for hypot(a,b)", 2019). Arguments far from 1 are scaled. */
 static double length(double a, double b) {
 #ifdef __FP_FAST_FMA
   const double difference = a - b;

@@ -41,9 +41,10 @@ struct TextureImage {
 // there. A photo counts for it as far as the surface faces it, no other part of the mesh is before it, and the matte
 // says that it is the head; finer photos more. Differences between photos and the mesh's colours are blended; their
 // mean is made the same for all photos. Parts that no photo shows have the mesh's colours in the photos' light
-// (photo_light.h), plus the remaining difference of their surroundings, which fades with the distance, a dark one sooner:
-// there is no step. On the neck, pixels far darker than elsewhere do not count: they show a collar. The same for any number of threads. `earlier`: texture of the head before these photos, of any size; its
-// colours replace the mesh's. Of 0 pixels: there is none.
+// (photo_light.h), plus the remaining difference of their surroundings, which fades with the distance, a dark one
+// sooner: there is no step. On the neck, pixels far darker than elsewhere do not count: they show a collar. The same
+// for any number of threads. `earlier`: texture of the head before these photos, of any size; its colours replace the
+// mesh's. Of 0 pixels: there is none.
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
                           WorkerThreads& threads, const TextureImage& earlier = {});
 

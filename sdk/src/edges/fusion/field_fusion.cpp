@@ -23,7 +23,7 @@ Value median_of(std::vector<Value> values) {
   return *middle;
 }
 
-void check_field(const EdgeField& field) {
+void check_field_to_fuse(const EdgeField& field) {
   const size_t pixels = size_t(std::max(field.width, 0)) * size_t(std::max(field.height, 0));
   if (pixels == 0 || field.distance_r.size() != pixels || field.depth_m.size() != pixels || !(field.eps_r > 0)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The field of the view has planes of ", field.distance_r.size(), " and ",
@@ -46,7 +46,7 @@ void check_not_cancelled(const std::atomic<bool>& is_cancelled) {
 }  // namespace
 
 void FieldFusion::add_view(const EdgeField& field, const PinholeCamera& pose) {
-  check_field(field);
+  check_field_to_fuse(field);
   check_camera(pose, "The view's camera");
   if (pose.width_px != field.width || pose.height_px != field.height) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The view's camera is of ", pose.width_px, " x ", pose.height_px,

@@ -272,8 +272,8 @@ void leave_out_collars(const Texels& texels, int side, Differences& seen) {
   if (weight <= 0) return;
   for (size_t i = 0; i < seen.weights.size(); ++i) {
     if (seen.weights[i] <= 0 || texels.is_cap[i] != 0) continue;
-    const double row = double(i / size_t(side)) + 0.5, column = double(i % size_t(side)) + 0.5;
-    if (std::hypot(row - 0.5 * side, column - 0.5 * side) < kNeckFraction * side) continue;
+    const size_t row = i / size_t(side), column = i % size_t(side);
+    if (std::hypot(double(row) + 0.5 - 0.5 * side, double(column) + 0.5 - 0.5 * side) < kNeckFraction * side) continue;
     seen.weights[i] *= float(1 - smooth_step(sum / weight - luma(&seen.values[3 * i]), kFirstCollar, kWholeCollar));
   }
 }

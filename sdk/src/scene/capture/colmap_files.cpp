@@ -22,7 +22,7 @@ constexpr ColmapModelInfo kColmapModels[] = {{"SIMPLE_PINHOLE", 0, 3}, {"PINHOLE
 const ColmapModelInfo& info_of(ColmapModel model) { return kColmapModels[size_t(model)]; }
 
 constexpr size_t kMaxLineBytes = 4096;
-constexpr size_t kMaxNameBytes = 1024;
+constexpr size_t kMaxImageNameBytes = 1024;
 constexpr char kKnownModels[] =
     "; the models that are read are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV and "
     "OPENCV_FISHEYE. Let COLMAP's image_undistorter make pinhole cameras of it.";
@@ -189,8 +189,8 @@ std::vector<ColmapImage> read_image_records(FileReader& file) {
     read_numbers(file, image.translation);
     image.camera_id = file.number<uint32_t>();
     while (const char letter = file.number<char>()) {
-      if (image.name.size() == kMaxNameBytes) {
-        file.fail(" has an image whose name is over ", kMaxNameBytes, " letters: it is damaged; copy it again.");
+      if (image.name.size() == kMaxImageNameBytes) {
+        file.fail(" has an image whose name is over ", kMaxImageNameBytes, " letters: it is damaged; copy it again.");
       }
       image.name.push_back(letter);
     }

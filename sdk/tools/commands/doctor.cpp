@@ -155,7 +155,7 @@ bool look_at_onnxruntime(const maquette::Context& context) {
   }
 }
 
-// True unless networks are damaged; a system whose networks are not installed may be one that nobody wants.
+// Returns false if networks are damaged. Missing networks are no error: users install only the systems they need.
 bool look_at_networks(const maquette::Context& context) {
   print_output("\nNetworks\n");
   if (!look_at_onnxruntime(context)) return false;

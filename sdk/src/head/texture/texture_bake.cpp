@@ -278,8 +278,7 @@ void leave_out_collars(const Texels& texels, int side, Differences& seen) {
   }
 }
 
-// For each channel, the value of the mesh's colours below which the fraction kDarkestFraction of those that photos show
-// is.
+// Returns a colour for each channel: the fraction kDarkestFraction of the mesh's colours that photos show is darker.
 std::array<float, 3> darkest_seen(const Texels& texels, const std::vector<float>& weights) {
   std::array<std::array<double, 256>, 3> histograms{};
   double total = 0;

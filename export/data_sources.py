@@ -6,6 +6,7 @@ Packages and versions are in export/people/assets.py and export/photos.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from export.bundle import LICENCE
 
@@ -57,3 +58,22 @@ DETECTOR_TRUNK = Source(
     "MobileNetV2 in ssd_mobilenet_v2_coco_2018_03_29 (TensorFlow detection model zoo, trained on COCO)", "Apache-2.0"
 )
 DETECTOR_WEIGHTS = Source("the person detector's weights (export/weights/densepose-b.pt)", LICENCE)
+
+CREDITS = "CREDITS.tsv"  # in a bundle: who is credited for each photograph of a pack (export.photos pack)
+
+
+def credited_sources(path: Path) -> list[Source]:
+    """The sources of a pack's photographs, from the file of credits that `python -m export.photos pack` wrote.
+
+    Raises ValueError for another file.
+    """
+    header, *rows = (line.split("\t") for line in path.read_text(encoding="utf-8").rstrip("\n").split("\n"))
+    if header != ["id", "licence", "source", "credit"] or any(len(row) != len(header) for row in rows):
+        raise ValueError(f"{path} is not a file of credits: make it by `python -m export.photos pack DIR`.")
+    licences: dict[str, set[str]] = {}
+    for _, licence, source, _ in rows:
+        licences.setdefault(source.partition("@")[0], set()).add(licence)
+    return [
+        Source(f"photographs of people of {name}, credited in {CREDITS}", ", ".join(sorted(found)))
+        for name, found in sorted(licences.items())
+    ]

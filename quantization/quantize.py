@@ -30,6 +30,7 @@ from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.registry import QDQRegistry, QLinearOpsRegistry
 
 from export.bundle import BundleInfo, bytes_of, read_manifest
+from export.data_sources import CREDITS
 from export.densepose import bundle as bundle_format
 from export.densepose.graphs import open_bundle
 from export.shards import load_records
@@ -220,6 +221,8 @@ def main() -> None:
     shutil.copy((options.keep or source.folder) / bundle_format.CHARTS, options.out)
     if crops:
         shutil.copy(source.folder / bundle_format.CROP_CHARTS, options.out)
+    if (source.folder / CREDITS).exists():
+        shutil.copy(source.folder / CREDITS, options.out)
     for name in kept["graphs"]:
         shutil.copy(options.keep / f"{name}.onnx", options.out)
     wanted = {name: settings.graphs[name] for name in source.manifest["graphs"] if name not in kept["graphs"]}

@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import copy
 import functools
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from export import data_sources
 from export.bundle import BundleInfo, bytes_of
 from export.densepose import bundle
 from export.densepose import targets as tg
@@ -256,6 +258,10 @@ def main() -> None:
     source.add_argument("--checkpoint", type=Path, help="checkpoint.pt of export.densepose.train")
     source.add_argument("--random", action="store_true", help="untrained weights, to try the runtime with")
     parser.add_argument("--crops", type=Path, metavar="FILE", help="weights of networks for the crop pass alone")
+    parser.add_argument(
+        "--credits", type=Path, metavar="FILE",
+        help="credits.tsv of a pack of photographs that the weights were trained on (export.photos pack)",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, help="the bundle's folder")
     parser.add_argument("--name", help="default: the folder's name")
     parser.add_argument("--width", type=int, default=64, help="channels, with --random")
@@ -271,13 +277,14 @@ def main() -> None:
     export_graphs(net.eval(), options.out, crop_net)
     records = load_records(options.data, options.images)
     images = [np.ascontiguousarray(record.decoded()[0][..., ::-1]) for record in records]
+    credited = data_sources.credited_sources(options.credits) if options.credits else ()
     errors = parity(net, options.out, images, crop_net)
     for name, error in errors.items():
         print(f"{name:24} largest error {error:.1e}")
     info = BundleInfo(
         name=options.name or options.out.name,
         precision="fp32",
-        training_data=() if options.random else bundle.TRAINING_DATA,
+        training_data=() if options.random else (*bundle.TRAINING_DATA, *(s.used_for("training") for s in credited)),
         measured={
             "onnx_against_torch": {
                 "largest_error": float(f"{max(errors.values()):.1e}"),
@@ -285,6 +292,8 @@ def main() -> None:
             }
         },
     )
+    if credited:
+        shutil.copyfile(options.credits, options.out / data_sources.CREDITS)
     bundle.write_manifest(options.out, info, net.config, DecodeConfig(), crops=crop_net is not None)
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
     if max(errors.values()) > TOLERANCE:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from export.photos import backgrounds, panoramas, people
+from export.photos import backgrounds, panoramas, people, photo_pack
 from export.photos.packages import PackageError, load_packages
 
 EPILOG = """\
@@ -16,6 +16,8 @@ examples:
   python -m export.photos people         photos and clips of people -> .data/photos/{photo,clip,train,val,test,fresh},
                                          without people -> .data/photos/{empty,animals,train-animals}
   python -m export.photos panoramas      places known all around, with their light -> .data/panoramas/{train,val,test}
+  python -m export.photos pack DIR       photos of people out of a folder with index.tsv (docs/reference/formats.md)
+                                         -> .data/photos/pack/{train,heldout,train-by-sa,heldout-by-sa}, credits.tsv
   python -m export.photos list           what there is, with package and licence; fetches nothing
 """
 
@@ -25,11 +27,17 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.photos", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("command", choices=("fetch", "backgrounds", "people", "panoramas", "list"))
+    parser.add_argument("command", choices=("fetch", "backgrounds", "people", "panoramas", "pack", "list"))
+    parser.add_argument("pack", type=Path, nargs="?", metavar="DIR", help="the folder of `pack`")
     parser.add_argument("--data", type=Path, default=Path(".data"), metavar="DIR", help="default: .data")
     parser.add_argument("--force", action="store_true", help="write files again that are already there")
     arguments = parser.parse_args(argv)
+    if (arguments.command == "pack") != (arguments.pack is not None):
+        parser.error("`pack` needs the folder of a pack, and no other command takes one")
     try:
+        if arguments.command == "pack":
+            folder = arguments.data / "photos/pack"
+            print_counts(folder, photo_pack.build(arguments.pack, folder))
         if arguments.command == "list":
             print_list()
         if arguments.command in ("fetch", "backgrounds"):
@@ -42,7 +50,7 @@ def main(argv: list[str] | None = None) -> int:
             folder = arguments.data / "photos"
             print(f"{folder}: {len(people.build(folder, arguments.force))} photos and clips of people")
             print_counts(folder, backgrounds.build(backgrounds.load_photographs(), folder, arguments.force))
-    except PackageError as error:
+    except (PackageError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0

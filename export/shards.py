@@ -28,12 +28,14 @@ from export.surface import (
 
 # Values of I beside 0..24, of photographs alone; U and V are 0:
 REGION = 100  # REGION + k: a person, coarse class k (1..14), front and back not told apart
+PART_ALONE = 150  # PART_ALONE + k: part k (1..24), U and V unknown
 UNSURE = 254  # a person or not
 PERSON = 255  # a person, somewhere on the body
 # Which of the 25 classes (0 background) each value of I leaves possible: bool [256, 25].
 POSSIBLE_PARTS = np.zeros((256, 25), bool)
 POSSIBLE_PARTS[np.arange(25), np.arange(25)] = True
 POSSIBLE_PARTS[REGION + 1 : REGION + 1 + COARSE_COUNT] = np.arange(1, COARSE_COUNT + 1)[:, None] == PART_TO_COARSE
+POSSIBLE_PARTS[PART_ALONE + np.arange(1, PART_COUNT + 1), np.arange(1, PART_COUNT + 1)] = True
 POSSIBLE_PARTS[PERSON, 1:] = True
 POSSIBLE_PARTS[UNSURE] = True
 
@@ -47,6 +49,7 @@ POINT_RANGE = np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 2.1]], np.float32)  # of 
 _MIRROR_VALUE = np.arange(256, dtype=np.uint8)
 _MIRROR_VALUE[:25] = MIRROR_PART
 _MIRROR_VALUE[REGION : REGION + COARSE_COUNT + 1] = REGION + MIRROR_COARSE
+_MIRROR_VALUE[PART_ALONE : PART_ALONE + PART_COUNT + 1] = PART_ALONE + MIRROR_PART
 
 
 class ShardError(ValueError):

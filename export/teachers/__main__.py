@@ -11,7 +11,7 @@ import numpy as np
 
 from export.jobs import Workers
 from export.photos.packages import PackageError
-from export.teachers.label import draw
+from export.teachers.label import PhotoLabels, draw
 from export.teachers.label_files import label_all
 
 EPILOG = """\
@@ -23,6 +23,7 @@ detector, landmarks and mask agree, yellow ones without landmarks, red ones wher
 labels are not asked again.
 """
 TILE = (420, 320)
+MAX_TILES = 400  # of the sheet; more make an image that JPEG cannot hold
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -47,13 +48,16 @@ def main(argv: list[str] | None = None) -> int:
         return 1
     try:
         found = label_all(photos, arguments.out, Workers.of(arguments), arguments.force)
+        tiles, people, sure = [], 0, 0
+        for photo, path in found.items():
+            labels = PhotoLabels.load(path)
+            people, sure = people + len(labels.sure), sure + int(labels.sure.sum())
+            if len(tiles) < MAX_TILES:
+                tiles.append(tile(draw(cv2.imread(str(photo)), labels)))
     except (PackageError, OSError, RuntimeError, ValueError) as error:
         print(error, file=sys.stderr)
         return 1
-    tiles = [tile(draw(cv2.imread(str(path)), labels)) for path, labels in found.items()]
     cv2.imwrite(str(arguments.out / "sheet.jpg"), sheet(tiles))
-    people = sum(len(labels.sure) for labels in found.values())
-    sure = sum(int(labels.sure.sum()) for labels in found.values())
     print(
         f"{len(found)} photos, {people} people found, {sure} of them with landmarks and mask; {arguments.out}/sheet.jpg"
     )

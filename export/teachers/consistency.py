@@ -8,9 +8,11 @@ becomes the label, so that training keeps on hard views what was right on easy o
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -118,6 +120,28 @@ class Consensus:
             sure = probability >= min_probability
             out[y[sure], x[sure], :3] = iuv[sure]
         return out
+
+
+class KeptConsensus:
+    """The consensus of weights files. It keeps completed labels in a folder, by image, label and weights, so that a
+    stopped run goes on where it was."""
+
+    def __init__(self, weights: list[Path], folder: Path) -> None:
+        self._consensus, self._folder = Consensus.of_files(weights), folder
+        self._weights = b"".join(hashlib.sha256(path.read_bytes()).digest() for path in weights)
+
+    def complete(self, image: np.ndarray, label: np.ndarray) -> np.ndarray:
+        """As `Consensus.complete`."""
+        name = hashlib.sha256(self._weights + image.tobytes() + label.tobytes()).hexdigest()
+        path = self._folder / f"{name}.png"
+        if path.exists():
+            return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        completed = self._consensus.complete(image, label)
+        self._folder.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial.png")
+        cv2.imwrite(str(partial), completed)
+        partial.replace(path)
+        return completed
 
 
 def _read(answer: Answer, box: np.ndarray, at: np.ndarray, possible: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,18 +9,21 @@ import cv2
 from tqdm import tqdm
 
 from export.jobs import Workers, results
-from export.teachers.label import PhotoLabels, label_photo
+from export.teachers.label import label_photo
 
 
-def label_all(photos: list[Path], out: Path, workers: Workers, force: bool = False) -> dict[Path, PhotoLabels]:
-    """Labels of every photo, made now or earlier, in `out`. Raises ValueError for a file that is no image."""
+def label_all(photos: list[Path], out: Path, workers: Workers, force: bool = False) -> dict[Path, Path]:
+    """Makes labels of every photo, unless they were made earlier, in `out`. Returns each photo's file of labels.
+
+    Raises ValueError for a file that is not an image.
+    """
     out.mkdir(parents=True, exist_ok=True)
     files = {photo: out / f"{photo.stem}.npz" for photo in photos}
     jobs = [(photo, path) for photo, path in files.items() if force or not path.exists()]
     with tqdm(total=len(photos), initial=len(photos) - len(jobs), desc="labelling", unit="photo", disable=None) as bar:
         for _ in results(workers.run(_label, jobs)):
             bar.update()
-    return {photo: PhotoLabels.load(path) for photo, path in files.items()}
+    return files
 
 
 def _label(job: tuple[Path, Path]) -> None:

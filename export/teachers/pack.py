@@ -130,7 +130,8 @@ def open_pack(path: Path, composed: int) -> None:
     ]
     empty = [_decoded(files[name]) for name in sorted(files) if name.startswith("backgrounds/train/")]
     without = [(image, np.zeros((*image.shape[:2], 4), np.uint8)) for image in empty]
-    people, count = write_training_set(pictures, without, 4, composed, DATA / "photos/shards/train")
+    rounds = [list(range(len(pictures)))] * 4
+    people, count = write_training_set(pictures, without, rounds, composed, DATA / "photos/shards/train")
     print(f"{len(pictures)} photographs of people, {len(empty)} without, {count} composed of {people} people cut out")
 
 

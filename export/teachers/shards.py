@@ -20,10 +20,11 @@ import numpy as np
 from tqdm import tqdm
 
 from export.people.augmentation import USUAL
-from export.shards import BOX_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
+from export.shards import BOX_ALONE, PART_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
 from export.surface import PART_COUNT, PART_TO_COARSE
 from export.teachers.coarse import SOMEWHERE, coarse_labels
-from export.teachers.consistency import Consensus
+from export.teachers.consistency import KeptConsensus
+from export.teachers.facing import CHEST, PhotoFacing, trunk_part
 from export.teachers.fit import PhotoFits
 from export.teachers.hands import SIDES, Hand, HandNetwork, hands_of
 from export.teachers.label import PhotoLabels
@@ -40,12 +41,13 @@ _GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
 
 def weak_label(
     labels: PhotoLabels, shape: tuple[int, int], fits: PhotoFits | None = None,
-    hands: dict[tuple[int, str], Hand] | None = None,
+    hands: dict[tuple[int, str], Hand] | None = None, facing: PhotoFacing | None = None,
 ) -> np.ndarray:  # fmt: skip
     """uint8 [H, W, 4] = (I, U, V, instance) of a photo of `shape` pixels, with I as in `export.shards`.
 
     People with a good fit of the body have its labels, others the coarse regions of their landmarks; over both lie the
-    hands that were seen, by person and side.
+    hands that were seen, by person and side. Trunks of people who face the camera, or look away from it, are chests or
+    backs.
 
     Boxes without a mask are filled with UNSURE; masks lie over them. Instances: 1.. with a mask, BOX_ALONE.. with a
     box alone, UNCERTAIN.. where the detector itself is not sure.
@@ -67,6 +69,8 @@ def weak_label(
             region = coarse_labels(labels.point[k], labels.visible[k], mask)
             value = np.where(region == SOMEWHERE, PERSON, REGION + region)
             value[(region == SOMEWHERE) & labels.doubt[k]] = UNSURE
+            if facing is not None and (part := trunk_part(facing.degrees[k])):
+                value[region == PART_TO_COARSE[CHEST]] = PART_ALONE + part
         out[mask, 0] = value[mask]
         out[mask, 1:3] = 0
         if k in dense:
@@ -200,14 +204,30 @@ def write_shards(pictures: Iterator[tuple[np.ndarray, np.ndarray]], count: int, 
             shard.write(out / f"shard-{number:05d}.npz", {"split": out.name, "shard": number, "generator": "photos"})
 
 
+def rounds_of(names: list[str], repeat: int, caps: dict[str, int]) -> list[list[int]]:
+    """`repeat` rounds of indices of photographs. caps: how many with a name "PREFIX-..." are in a round, by prefix; the
+    rounds take them one after the other, so that each of them is seen."""
+    group = [name.partition("-")[0] for name in names]
+    free = [k for k, prefix in enumerate(group) if prefix not in caps]
+    out = []
+    for number in range(repeat):
+        chosen = list(free)
+        for prefix, cap in caps.items():
+            members = [k for k, own in enumerate(group) if own == prefix]
+            chosen += np.roll(members, -number * cap).tolist()[:cap]
+        out.append(chosen)
+    return out
+
+
 def write_training_set(
-    pictures: list[tuple[np.ndarray, np.ndarray]], empty: list[tuple[np.ndarray, np.ndarray]], repeat: int,
+    pictures: list[tuple[np.ndarray, np.ndarray]], empty: list[tuple[np.ndarray, np.ndarray]], rounds: list[list[int]],
     composed_images: int, out: Path,
 ) -> tuple[int, int]:  # fmt: skip
-    """Shards of images with people and without, each `repeat` times, and of images composed of both. Returns how many
-    people were cut out and how many images composed."""
-    people = [person for picture in pictures for person in cut_outs(*picture)]
-    every = (pictures + empty) * repeat
+    """Shards of images with people and without, and of images composed of both. rounds: indices of the images with
+    people; each round has all images without. Returns how many people were cut out of the first round's images and how
+    many images composed."""
+    people = [person for k in rounds[0] for person in cut_outs(*pictures[k])]
+    every = [picture for chosen in rounds for picture in ([pictures[k] for k in chosen] + empty)]
     rng = np.random.default_rng(0)
     rng.shuffle(every)  # so that every shard holds both kinds
     count = composed_images if people and empty else 0
@@ -226,16 +246,27 @@ def read(path: Path) -> np.ndarray:
     return image
 
 
+def _cap(text: str) -> tuple[str, int]:
+    prefix, _, count = text.partition("=")
+    if not prefix or not count.isdigit() or int(count) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not PREFIX=N with N of at least 1, such as gm=40")
+    return prefix, int(count)
+
+
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m export.teachers.shards", description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("--photos", type=Path, default=Path(".data/photos/train"), metavar="DIR")
+    parser.add_argument("--photos", type=Path, nargs="+", default=[Path(".data/photos/train")], metavar="DIR")
     parser.add_argument("--labels", type=Path, default=Path(".data/teachers/labels"), metavar="DIR")
     parser.add_argument(
         "--fits", type=Path, default=Path(".data/teachers/fits"), metavar="DIR", help="if there are any"
     )
+    parser.add_argument(
+        "--facing", type=Path, default=Path(".data/teachers/facing"), metavar="DIR",
+        help="directions of people (export.teachers.facing), if there are any",
+    )  # fmt: skip
     parser.add_argument(
         "--consistent", type=Path, nargs="+", default=[], metavar="WEIGHTS",
         help="weights.pt of trainings: what they agree on about people seen large completes the labels",
@@ -257,25 +288,34 @@ def main(argv: list[str] | None = None) -> int:
         help="how often each photograph is among them, so that it is seen as often as before many composed ones "
              "(default %(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--cap", type=_cap, nargs="+", default=[], metavar="PREFIX=N",
+        help="at most N photographs named PREFIX-... in each repeat, such as those of a few people seen often",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, default=Path(".data/photos/shards/train"), metavar="DIR")
     arguments = parser.parse_args(argv)
-    photos = [(p, arguments.labels / f"{p.stem}.npz") for p in sorted(arguments.photos.glob("*.jpg"))]
+    paths = [path for folder in arguments.photos for path in sorted(folder.glob("*.jpg"))]
+    photos = [(path, arguments.labels / f"{path.stem}.npz") for path in paths]
     missing = sum(not labels.exists() for _, labels in photos)
     if missing or not photos:
-        print(f"No labels for {missing} of {len(photos)} photos in {arguments.photos}: run "
-              f"`python -m export.teachers --photos {arguments.photos}` first.", file=sys.stderr)  # fmt: skip
+        folders = " ".join(map(str, arguments.photos))
+        print(f"No labels for {missing} of {len(photos)} photos in {folders}: run "
+              f"`python -m export.teachers --photos {folders}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    pictures, fitted, seen_hands = [], 0, 0
+    pictures, fitted, turned, seen_hands = [], 0, 0, 0
     hand_network = HandNetwork() if arguments.hands else None
-    consensus = Consensus.of_files(arguments.consistent) if arguments.consistent else None
+    kept_answers = arguments.out / "labels"
+    consensus = KeptConsensus(arguments.consistent, kept_answers) if arguments.consistent else None
     for path, labels in tqdm(photos, desc="labels", unit="photo", disable=None):
         image = read(path)
         fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
         fitted += 0 if fits is None else int(fits.accepted.sum())
+        facing = PhotoFacing.load(kept) if (kept := arguments.facing / labels.name).exists() else None
+        turned += 0 if facing is None else int(np.isfinite(facing.degrees).sum())
         told = PhotoLabels.load(labels)
         hands = hands_of(hand_network, image, told) if hand_network else {}
         seen_hands += len(hands)
-        label = weak_label(told, image.shape[:2], fits, hands)
+        label = weak_label(told, image.shape[:2], fits, hands, facing)
         if consensus:
             label = consensus.complete(image, label)
         pictures.append(shrunk(image, label))
@@ -284,11 +324,12 @@ def main(argv: list[str] | None = None) -> int:
     for path in sorted(p for folder in arguments.empty for p in folder.glob("*.jpg")):
         image = read(path)
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
-    people, count = write_training_set(pictures, empty, arguments.repeat, arguments.composed, arguments.out)
+    rounds = rounds_of([path.stem for path in paths], arguments.repeat, dict(arguments.cap))
+    people, count = write_training_set(pictures, empty, rounds, arguments.composed, arguments.out)
     print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
           f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body, "
-          f"{seen_hands} hands), {int((known >= BOX_ALONE).sum())} with a box alone; each {arguments.repeat} times; "
-          f"{count} images composed of {people} people cut out")  # fmt: skip
+          f"{turned} with a direction, {seen_hands} hands), {int((known >= BOX_ALONE).sum())} with a box alone; "
+          f"each {arguments.repeat} times; {count} images composed of {people} people cut out")  # fmt: skip
     return 0
 
 

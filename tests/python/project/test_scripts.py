@@ -34,3 +34,12 @@ def test_training_from_a_pack_says_what_it_needs():
     assert all(f"train-from-pack.sh {command}" in said.stdout for command in ("render", "crops", "both"))
     assert "PERCENT" in said.stdout
     assert subprocess.run([script, "render"], capture_output=True, text=True).returncode == 2
+
+
+def test_training_with_a_pack_of_photographs_says_what_it_needs():
+    script = WITH_AMX.with_name("train-people.sh")
+    said = subprocess.run([script], capture_output=True, text=True)
+    assert said.returncode == 2
+    assert all(f"train-people.sh {command}" in said.stdout for command in ("label", "render", "train"))
+    assert all(name in said.stdout for name in ("WORK", "MINUTES", "IMAGES", "COMPOSED", "PROCESSES", "CAP"))
+    assert subprocess.run([script, "label"], capture_output=True, text=True).returncode == 2

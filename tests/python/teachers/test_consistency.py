@@ -8,7 +8,7 @@ torch = pytest.importorskip("torch", reason="the networks need torch: scripts/ma
 from export.densepose.config import NetworkConfig  # noqa: E402
 from export.densepose.network import MobileParsingRCNN  # noqa: E402
 from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNSURE  # noqa: E402
-from export.teachers.consistency import Answer, Consensus  # noqa: E402
+from export.teachers.consistency import Answer, Consensus, KeptConsensus  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +55,30 @@ def test_what_is_known_stays_and_the_rest_is_filled_within_what_is_possible(cons
     assert np.array_equal(filled[..., 3], label[..., 3])
     # Weights that know nothing agree on nothing.
     assert np.array_equal(consensus.complete(image, label, min_probability=0.95), label)
+
+
+def test_an_answer_is_kept_for_the_same_image_label_and_weights_alone(consensus, picture, tmp_path, monkeypatch):
+    asked = []
+
+    class Counted(Consensus):
+        def complete(self, image, label):
+            asked.append(label)
+            return consensus.complete(image, label, min_probability=0.0)
+
+    monkeypatch.setattr(Consensus, "of_files", staticmethod(lambda weights: Counted(consensus.networks)))
+    weights = tmp_path / "weights.pt"
+    weights.write_bytes(b"first")
+    image, label = picture
+    first = KeptConsensus([weights], tmp_path / "kept").complete(image, label)
+    again = KeptConsensus([weights], tmp_path / "kept").complete(image, label)
+    assert len(asked) == 1
+    assert np.array_equal(first, again)
+    assert np.array_equal(first, consensus.complete(image, label, min_probability=0.0))
+    KeptConsensus([weights], tmp_path / "kept").complete(image, np.zeros_like(label))
+    KeptConsensus([weights], tmp_path / "kept").complete(np.ascontiguousarray(image[::-1]), label)
+    weights.write_bytes(b"second")
+    KeptConsensus([weights], tmp_path / "kept").complete(image, label)
+    assert len(asked) == 4
 
 
 def test_charts_are_averaged_by_the_probability_of_their_part():

@@ -8,13 +8,24 @@ import pytest
 
 from export import surface
 from export.densepose import data
-from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNCERTAIN, UNSURE, load_records, mirror_iuv
+from export.shards import (
+    BOX_ALONE,
+    PART_ALONE,
+    PERSON,
+    POSSIBLE_PARTS,
+    REGION,
+    UNCERTAIN,
+    UNSURE,
+    load_records,
+    mirror_iuv,
+)
 from export.teachers import shards
+from export.teachers.facing import PhotoFacing
 from export.teachers.fit import PhotoFits
 from export.teachers.hands import Hand
 from export.teachers.label import PhotoLabels
 from export.teachers.landmarks import NAMES
-from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, weak_label
+from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, rounds_of, weak_label
 
 SHAPE = (100, 200)
 BOXES = np.array([[10, 10, 50, 90], [60, 10, 100, 90], [110, 10, 150, 90], [160, 10, 190, 90]], np.float32)
@@ -58,6 +69,29 @@ def test_a_fitted_body_gives_part_u_and_v_where_it_is_believed():
     assert found[70, 20].tolist() == [PERSON, 0, 0, 1]  # of the fit's own
     assert found[50, 40].tolist() == [PERSON, 0, 0, 1]  # beside the fit
     assert found[50, 70].tolist() == [PERSON, 0, 0, 2]  # not believed
+
+
+@pytest.mark.parametrize(("degrees", "value"), [(0, PART_ALONE + 2), (180, PART_ALONE + 1), (90, REGION + 1)])
+def test_the_trunk_of_a_person_of_known_direction_is_a_chest_or_a_back(degrees, value):
+    plain = weak_label(photo_labels(), SHAPE)
+    label = weak_label(photo_labels(), SHAPE, facing=PhotoFacing(np.array([degrees, 0, 0, 0], np.float32)))
+    trunk = plain[..., 0] == REGION + 1
+    assert trunk.sum() > 50
+    assert (label[trunk] == (value, 0, 0, 1)).all()
+    assert np.array_equal(label[~trunk], plain[~trunk])
+    assert np.flatnonzero(POSSIBLE_PARTS[PART_ALONE + 2]).tolist() == [2]
+
+
+def test_a_group_that_is_seen_often_has_a_cap_and_each_of_it_is_seen():
+    names = ["ab-1", "gm-1", "gm-2", "gm-3", "gmx-1", "ab-2", "gm-4", "gm-5"]
+    rounds = rounds_of(names, 3, {"gm": 2, "none": 9})
+    assert [sorted(names[k] for k in chosen) for chosen in rounds] == [
+        ["ab-1", "ab-2", "gm-1", "gm-2", "gmx-1"],
+        ["ab-1", "ab-2", "gm-3", "gm-4", "gmx-1"],
+        ["ab-1", "ab-2", "gm-1", "gm-5", "gmx-1"],
+    ]
+    assert rounds_of(names, 2, {}) == [list(range(8))] * 2
+    assert rounds_of(names, 1, {"gm": 9}) == [[0, 4, 5, 1, 2, 3, 6, 7]]
 
 
 def open_hand(middle: tuple[float, float], size: float = 16) -> Hand:
@@ -117,7 +151,8 @@ def folders(tmp_path):
 
 
 def arguments(folder) -> list[str]:
-    names = {"photos": "people", "labels": "labels", "fits": "fits", "empty": "empty", "out": "shards"}
+    names = {"photos": "people", "labels": "labels", "fits": "fits", "facing": "facing", "empty": "empty"}
+    names["out"] = "shards"
     return [text for option, name in names.items() for text in (f"--{option}", str(folder / name))]
 
 
@@ -131,7 +166,8 @@ def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
     assert main([*arguments(folders), "--composed", "3", "--repeat", "2"]) == 0
     told = capsys.readouterr().out
-    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body, 0 hands)" in told
+    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body," in told
+    assert "0 with a direction, 0 hands)" in told
     assert "1 with a box alone; each 2 times; 3 images composed" in told
     records = load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
@@ -143,6 +179,18 @@ def test_shards_are_read_by_the_training(folders, capsys):
     batches.close()
     assert image.shape == (8, 3, 64, 64)
     assert len(truths) == 8
+
+
+def test_a_capped_group_comes_into_the_shards_less_often(folders, capsys):
+    for name in ("gm-1", "gm-2"):
+        cv2.imwrite(str(folders / "people" / f"{name}.jpg"), np.zeros((*SHAPE, 3), np.uint8))
+        photo_labels().save(folders / "labels" / f"{name}.npz")
+    photo_labels().save(folders / "labels" / "a.npz")
+    assert main([*arguments(folders), "--composed", "1", "--repeat", "2", "--cap", "gm=1"]) == 0
+    assert len(load_records(folders / "shards")) == 2 * (1 + 1 + 1) + 1
+    with pytest.raises(SystemExit):
+        main([*arguments(folders), "--cap", "gm"])
+    assert "'gm' is not PREFIX=N" in capsys.readouterr().err
 
 
 def test_hands_can_be_left_to_wrists_and_knuckles(folders, monkeypatch):

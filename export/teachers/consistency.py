@@ -19,8 +19,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.densepose import targets as tg
-from export.densepose.config import NetworkConfig
+from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.data import MEAN, normalised
+from export.densepose.decode import Graphs, infer
 from export.densepose.network import MobileParsingRCNN
 from export.densepose.person_crop import crop_around, cut, outline, turned_box
 from export.shards import BOX_ALONE, POSSIBLE_PARTS, UNSURE
@@ -29,6 +30,7 @@ from export.surface import MIRROR_COARSE, MIRROR_FLIPS_U, MIRROR_FLIPS_V, MIRROR
 CROP_SIDES_PX = (192, 256, 320)
 MIN_HEIGHT_PX = 96  # smaller people are no easy view
 MIN_PROBABILITY = 0.7  # of a part, as the mean of all answers
+FINDING = DecodeConfig(long_side=480, score_threshold=0.3)  # of people whom the teachers may have missed
 
 
 @dataclass(frozen=True)
@@ -121,22 +123,34 @@ class Consensus:
             out[y[sure], x[sure], :3] = iuv[sure]
         return out
 
+    def ignore_unlabelled(self, image: np.ndarray, label: np.ndarray) -> np.ndarray:
+        """A copy of the label in which training leaves out people whom the first weights find and the label does not
+        have. In a crowd the teachers miss many, who would be learnt as background."""
+        net, out = self.networks[0], label.copy()
+        found = infer(Graphs.of_network(net), np.ascontiguousarray(image[..., ::-1]), net.config, FINDING)
+        for k in range(len(found.boxes)):
+            own = found.instance == k + 1
+            free = own & (label[..., 3] == 0)
+            if 2 * free.sum() > own.sum():
+                out[free] = (UNSURE, 0, 0, 255 - k)
+        return out
+
 
 class KeptConsensus:
-    """The consensus of weights files. It keeps completed labels in a folder, by image, label and weights, so that a
-    stopped run goes on where it was."""
+    """The consensus of weights files. It keeps its labels in a folder, by image, label and weights, so that a stopped
+    run goes on where it was."""
 
     def __init__(self, weights: list[Path], folder: Path) -> None:
         self._consensus, self._folder = Consensus.of_files(weights), folder
         self._weights = b"".join(hashlib.sha256(path.read_bytes()).digest() for path in weights)
 
     def complete(self, image: np.ndarray, label: np.ndarray) -> np.ndarray:
-        """As `Consensus.complete`."""
+        """As `Consensus.complete`, then `Consensus.ignore_unlabelled`."""
         name = hashlib.sha256(self._weights + image.tobytes() + label.tobytes()).hexdigest()
         path = self._folder / f"{name}.png"
         if path.exists():
             return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        completed = self._consensus.complete(image, label)
+        completed = self._consensus.ignore_unlabelled(image, self._consensus.complete(image, label))
         self._folder.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(".partial.png")
         cv2.imwrite(str(partial), completed)

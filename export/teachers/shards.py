@@ -302,31 +302,38 @@ def main(argv: list[str] | None = None) -> int:
         print(f"No labels for {missing} of {len(photos)} photos in {folders}: run "
               f"`python -m export.teachers --photos {folders}` first.", file=sys.stderr)  # fmt: skip
         return 1
-    pictures, fitted, turned, seen_hands = [], 0, 0, 0
+    pictures, names, fitted, turned, seen_hands = [], [], 0, 0, 0
     hand_network = HandNetwork() if arguments.hands else None
     kept_answers = arguments.out / "labels"
     consensus = KeptConsensus(arguments.consistent, kept_answers) if arguments.consistent else None
     for path, labels in tqdm(photos, desc="labels", unit="photo", disable=None):
+        told = PhotoLabels.load(labels)
+        if not told.sure.any():  # nobody's mask is confirmed, and people may have no box at all
+            continue
+        names.append(path.stem)
         image = read(path)
         fits = PhotoFits.load(kept) if (kept := arguments.fits / labels.name).exists() else None
         fitted += 0 if fits is None else int(fits.accepted.sum())
         facing = PhotoFacing.load(kept) if (kept := arguments.facing / labels.name).exists() else None
         turned += 0 if facing is None else int(np.isfinite(facing.degrees).sum())
-        told = PhotoLabels.load(labels)
         hands = hands_of(hand_network, image, told) if hand_network else {}
         seen_hands += len(hands)
         label = weak_label(told, image.shape[:2], fits, hands, facing)
         if consensus:
             label = consensus.complete(image, label)
         pictures.append(shrunk(image, label))
+    if not pictures:
+        print(f"None of the {len(photos)} photos has a person with landmarks and mask.", file=sys.stderr)
+        return 1
     known = np.concatenate([instance[~ignore] for _, instance, ignore in (visible_boxes(p[1]) for p in pictures)])
     empty = []
     for path in sorted(p for folder in arguments.empty for p in folder.glob("*.jpg")):
         image = read(path)
         empty.append(shrunk(image, np.zeros((*image.shape[:2], 4), np.uint8)))
-    rounds = rounds_of([path.stem for path in paths], arguments.repeat, dict(arguments.cap))
+    rounds = rounds_of(names, arguments.repeat, dict(arguments.cap))
     people, count = write_training_set(pictures, empty, rounds, arguments.composed, arguments.out)
-    print(f"{arguments.out}: {len(photos)} photographs of people, {len(empty)} without; "
+    print(f"{arguments.out}: {len(names)} photographs of people, {len(empty)} without; "
+          f"{len(photos) - len(names)} left out, with landmarks of nobody; "
           f"{int((known < BOX_ALONE).sum())} people with a mask ({fitted} of them with a fitted body, "
           f"{turned} with a direction, {seen_hands} hands), {int((known >= BOX_ALONE).sum())} with a box alone; "
           f"each {arguments.repeat} times; {count} images composed of {people} people cut out")  # fmt: skip

@@ -6,8 +6,10 @@ import pytest
 torch = pytest.importorskip("torch", reason="the networks need torch: scripts/make-venv.sh train,dev")
 
 from export.densepose.config import NetworkConfig  # noqa: E402
+from export.densepose.decode import Result  # noqa: E402
 from export.densepose.network import MobileParsingRCNN  # noqa: E402
-from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNSURE  # noqa: E402
+from export.shards import BOX_ALONE, PERSON, POSSIBLE_PARTS, REGION, UNSURE, visible_boxes  # noqa: E402
+from export.teachers import consistency  # noqa: E402
 from export.teachers.consistency import Answer, Consensus, KeptConsensus  # noqa: E402
 
 
@@ -57,6 +59,20 @@ def test_what_is_known_stays_and_the_rest_is_filled_within_what_is_possible(cons
     assert np.array_equal(consensus.complete(image, label, min_probability=0.95), label)
 
 
+def test_people_whom_only_the_weights_find_are_left_out_of_training(consensus, picture, monkeypatch):
+    image, label = picture
+    instance = np.zeros(label.shape[:2], np.uint8)
+    instance[20:140, 40:110], instance[5:60, 120:148] = 1, 2  # somebody labelled, and somebody who is not
+    label[5:8, 120:148, 0] = UNSURE
+    found = Result(np.zeros((2, 4), np.float32), np.ones(2, np.float32), np.zeros((160, 200, 3), np.uint8), instance)
+    monkeypatch.setattr(consistency, "infer", lambda graphs, rgb, network, config: found)
+    out = consensus.ignore_unlabelled(image, label)
+    changed = (out != label).any(-1)
+    assert np.array_equal(changed, instance == 2)
+    assert (out[changed] == (UNSURE, 0, 0, 254)).all()
+    assert visible_boxes(out)[2].tolist() == [False, False, False, True]
+
+
 def test_an_answer_is_kept_for_the_same_image_label_and_weights_alone(consensus, picture, tmp_path, monkeypatch):
     asked = []
 
@@ -64,6 +80,9 @@ def test_an_answer_is_kept_for_the_same_image_label_and_weights_alone(consensus,
         def complete(self, image, label):
             asked.append(label)
             return consensus.complete(image, label, min_probability=0.0)
+
+        def ignore_unlabelled(self, image, label):
+            return label
 
     monkeypatch.setattr(Consensus, "of_files", staticmethod(lambda weights: Counted(consensus.networks)))
     weights = tmp_path / "weights.pt"

@@ -166,8 +166,8 @@ def test_shards_are_read_by_the_training(folders, capsys):
     photo_labels().save(folders / "labels" / "a.npz")
     assert main([*arguments(folders), "--composed", "3", "--repeat", "2"]) == 0
     told = capsys.readouterr().out
-    assert "1 photographs of people, 1 without; 2 people with a mask (0 of them with a fitted body," in told
-    assert "0 with a direction, 0 hands)" in told
+    assert "1 photographs of people, 1 without; 0 left out, with landmarks of nobody; 2 people with a mask (" in told
+    assert "(0 of them with a fitted body, 0 with a direction, 0 hands)" in told
     assert "1 with a box alone; each 2 times; 3 images composed" in told
     records = load_records(folders / "shards")
     sizes = sorted(record.decoded()[0].shape[:2] for record in records)
@@ -179,6 +179,15 @@ def test_shards_are_read_by_the_training(folders, capsys):
     batches.close()
     assert image.shape == (8, 3, 64, 64)
     assert len(truths) == 8
+
+
+def test_photographs_with_landmarks_of_nobody_are_left_out(folders, capsys):
+    photo_labels().save(folders / "labels" / "a.npz")
+    cv2.imwrite(str(folders / "people" / "b.jpg"), np.zeros((*SHAPE, 3), np.uint8))
+    dataclasses.replace(photo_labels(), sure=np.zeros(4, bool)).save(folders / "labels" / "b.npz")
+    assert main([*arguments(folders), "--composed", "1", "--repeat", "1"]) == 0
+    assert "1 photographs of people, 1 without; 1 left out, with landmarks of nobody" in capsys.readouterr().out
+    assert len(load_records(folders / "shards")) == 3
 
 
 def test_a_capped_group_comes_into_the_shards_less_often(folders, capsys):

@@ -7,6 +7,7 @@ import numpy as np
 import onnx
 import pytest
 import torch
+from rectangle_people import write_shard
 
 from export.bundle import BundleInfo
 from export.densepose import bundle, export_onnx, graphs, targets
@@ -190,6 +191,32 @@ def test_manifest_signs_the_files_and_lists_their_tensors(kind, request):
                 assert all(a == b for a, b in fixed), tensor["name"]
     assert manifest["licence"]
     assert all({"name", "licence", "used_for"} <= set(entry) for entry in manifest["training_data"])
+
+
+def test_weights_of_a_pack_of_photographs_name_its_sources_and_bring_its_credits(net, tmp_path, monkeypatch, capsys):
+    write_shard(tmp_path / "val", 1)
+    config = {"width": WIDTH, "backbone": net.config.backbone, "evidence": net.config.evidence}
+    torch.save({"ema": net.state_dict(), **config}, tmp_path / "weights.pt")
+    (tmp_path / "credits.tsv").write_text("id\tlicence\tsource\tcredit\na\tCC-BY-4.0\tsome/book@12\tA. Author\n")
+    given = [
+        "export_onnx",
+        "--checkpoint",
+        str(tmp_path / "weights.pt"),
+        "--data",
+        str(tmp_path / "val"),
+        "--images",
+        "1",
+    ]
+    given += ["--credits", str(tmp_path / "credits.tsv"), "--out", str(tmp_path / "bundle")]
+    monkeypatch.setattr("sys.argv", given)
+    export_onnx.main()
+    manifest = json.loads((tmp_path / "bundle/manifest.json").read_text())
+    assert manifest["training_data"][:-1] == list(bundle.TRAINING_DATA)
+    assert manifest["training_data"][-1] == {
+        "name": "photographs of people of some/book, credited in CREDITS.tsv", "licence": "CC-BY-4.0",
+        "used_for": "training",
+    }  # fmt: skip
+    assert (tmp_path / "bundle/CREDITS.tsv").read_bytes() == (tmp_path / "credits.tsv").read_bytes()
 
 
 def test_a_manifest_is_refused_for_graphs_with_other_names(folder, tmp_path):

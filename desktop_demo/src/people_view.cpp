@@ -181,7 +181,7 @@ void PeopleView::draw_model_options() {
     model_.detail = parts_alone ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;
     changed = true;
   }
-  int crops = int(model_.person_crops);
+  int crops = int(model_.person_crops);  // the default of streams is off
   if (ImGui::Combo("crops of people", &crops, "off\0small or leaning\0all\0")) {
     model_.person_crops = maq_densepose_crops(crops);
     changed = true;

@@ -23,13 +23,13 @@ class MaquetteDensePose:
                 "image": ("IMAGE",),
                 "colours": (["detectron2", "magicanimate"],),
                 "long_side_px": ("INT", {"default": 0, "min": 0, "max": 2048, "step": 32}),  # 0: chosen by the package
-                "person_crops": (["auto", "off", "all"],),
+                "preset": (["photo", "stream"],),
             }
         }
 
-    def run(self, image: torch.Tensor, colours: str, long_side_px: int, person_crops: str) -> tuple:
+    def run(self, image: torch.Tensor, colours: str, long_side_px: int, preset: str) -> tuple:
         hints, masks = [], []
-        with maquette.DensePose(long_side_px=long_side_px, person_crops=person_crops) as people:
+        with maquette.DensePose(long_side_px=long_side_px, preset=preset) as people:
             for pixels in (image.cpu().numpy() * 255).round().astype(np.uint8):
                 result = people.run(pixels)
                 hints.append(visualize(result, colours=colours))

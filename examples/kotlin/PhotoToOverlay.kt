@@ -8,7 +8,7 @@ import dev.maquette.ModelBundle
 /** Draws the people of a photo over it, each pixel in the colour of its body part. Takes a while: not on the main thread. */
 fun photoToOverlay(photo: Bitmap, networks: ModelBundle): Bitmap =
     Maquette().use { maquette ->
-        val config = DensePose.Config(personCrops = DensePose.PersonCrops.AUTO)
+        val config = DensePose.Config(preset = DensePose.Preset.PHOTO)
         maquette.densePose(networks, config).use { people ->
             maquette.frame(photo).use { frame ->
                 people.run(frame).use { result ->

@@ -7,5 +7,5 @@ from maquette.adapters.detectron2 import visualize
 
 photo, out = sys.argv[1:3]
 colours = sys.argv[3] if len(sys.argv) > 3 else "detectron2"
-result = maquette.DensePose(person_crops="auto").run(photo)
+result = maquette.DensePose(preset="photo").run(photo)
 maquette.Frame(visualize(result, colours=colours)).save(out)

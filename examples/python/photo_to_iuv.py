@@ -5,7 +5,7 @@ import sys
 import maquette
 
 photo, out = sys.argv[1:3]
-result = maquette.DensePose(person_crops="auto").run(photo)
+result = maquette.DensePose(preset="photo").run(photo)
 result.save(out)  # _IUV.png, _INDS.png and .json
 maquette.Frame(result.painted(photo)).save(f"{out}_painted.png")
 for person in result.people:

@@ -70,6 +70,9 @@ class ModelSettings(TypedDict, total=False):
 class DensePoseSettings(ModelSettings, total=False):
     """Fields of maq_densepose_config."""
 
+    preset: Literal["stream", "photo"]
+    """Default "stream"."""
+
     long_side_px: int
     """Images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's value finds near people. If
     it shows small people or nobody, larger images are also searched at 480 pixels. In a stream (frames with a
@@ -97,11 +100,11 @@ class DensePoseSettings(ModelSettings, total=False):
     detail: Literal["surface", "part"]
     """Default "surface"."""
 
-    person_crops: Literal["off", "auto", "all"]
-    """Default "off"."""
+    person_crops: Literal["default", "auto", "all", "off"]
+    """Default "default"."""
 
     person_crop_px: int
-    """Side of a crop, 64 to 512; 0 (default): 192. Smaller is faster."""
+    """Side of a crop, 64 to 512; 0 (default): 192, of photos 256. Smaller is faster."""
 
     result_pool_size: int
     """Results the app may hold at once, 1 to 64; 0 (default): 4."""

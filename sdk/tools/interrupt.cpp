@@ -3,17 +3,16 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
 #include <ctime>
 #include <initializer_list>
-#include <mutex>
 #include <system_error>
 #include <thread>
-#include <vector>
+
+#include "open_sources.h"
 
 namespace {
 
@@ -47,22 +46,11 @@ void handle(int number) {
   errno = error;
 }
 
-// Never destroyed: the thread that reads it may outlive main().
-struct OpenSources {
-  std::mutex mutex;
-  std::vector<maq_source*> all;
-};
-OpenSources& open_sources() {
-  static auto* sources = new OpenSources;
-  return *sources;
-}
-
 void stop_sources_when_asked() {
   uint64_t count = 0;
   while (read(event, &count, sizeof count) < 0 && errno == EINTR) {
   }
-  const std::lock_guard<std::mutex> lock(open_sources().mutex);
-  for (maq_source* source : open_sources().all) maq_source_stop(source);
+  stop_open_sources();
 }
 
 }  // namespace
@@ -84,15 +72,3 @@ void catch_interrupts() {
 bool interrupted() { return asked_ns != 0; }
 
 int interrupting_signal() { return asking_signal; }
-
-StoppedByInterrupt::StoppedByInterrupt(const maquette::Source& source) : source_(source.get()) {
-  const std::lock_guard<std::mutex> lock(open_sources().mutex);
-  open_sources().all.push_back(source_);
-  if (interrupted()) maq_source_stop(source_);
-}
-
-StoppedByInterrupt::~StoppedByInterrupt() {
-  const std::lock_guard<std::mutex> lock(open_sources().mutex);
-  std::vector<maq_source*>& all = open_sources().all;
-  all.erase(std::remove(all.begin(), all.end(), source_), all.end());
-}

@@ -11,6 +11,13 @@ extern "C" {
 typedef struct maq_densepose maq_densepose;
 typedef struct maq_densepose_result maq_densepose_result;
 
+/* The use that the other defaults are for. */
+typedef enum maq_densepose_preset {
+  MAQ_DENSEPOSE_PRESET_STREAM = 0, /* frames of a camera or clip: fast */
+  MAQ_DENSEPOSE_PRESET_PHOTO = 1 /* single images: everybody is mapped again in a crop of 256 pixels. Finds more people,
+                                    hands and feet; takes two to three times as long. */
+} maq_densepose_preset;
+
 /* The labels that each pixel of a person gets. */
 typedef enum maq_densepose_detail {
   MAQ_DENSEPOSE_DETAIL_SURFACE = 0, /* part, U and V */
@@ -21,33 +28,39 @@ typedef enum maq_densepose_detail {
  * upright by the body axis of the first surface. Crops find more of hands, and of people who lean or are far away. Each
  * crop takes about as long as a small frame. */
 typedef enum maq_densepose_crops {
-  MAQ_DENSEPOSE_CROPS_OFF = 0,
-  MAQ_DENSEPOSE_CROPS_AUTO = 1, /* people who are small in the networks' input, or lean by more than 15 degrees */
-  MAQ_DENSEPOSE_CROPS_ALL = 2
+  MAQ_DENSEPOSE_CROPS_DEFAULT = 0, /* the preset's: off for streams, all for photos */
+  MAQ_DENSEPOSE_CROPS_AUTO = 1,    /* people who are small in the networks' input, or lean by more than 15 degrees */
+  MAQ_DENSEPOSE_CROPS_ALL = 2,
+  MAQ_DENSEPOSE_CROPS_OFF = 3
 } maq_densepose_crops;
 
-/* Options. 0 is the default in every field; `model` has its own (types.h). */
+/* Options. 0 is the default in every field; `model` has its own (types.h).
+ *
+ * Frames with a `sequence` above 0, and all frames with key_frame_interval above 1, are frames of a stream. In a
+ * stream, a person who hardly moves is seen through the same pixels in each frame. A label stays until another one is
+ * clearly more likely. */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
-  maq_model_options model;    /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */
-  int32_t long_side_px;       /* images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's
-                                 value finds near people. If it shows small people or nobody, larger images are also
-                                 searched at 480 pixels. In a stream (frames with a `sequence` above 0), earlier
-                                 frames count, too. */
-  float score_threshold;      /* minimum score of a person, up to 1; 0 (default): the bundle's value */
-  int32_t max_people;         /* 1 to 255, best scores first; 0 (default): the bundle's value */
-  int32_t max_proposals;      /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes
-                                 are faster and may miss people in a crowd. */
-  int32_t key_frame_interval; /* 0 (default) and 1: every frame is a key frame, in which people are detected. N, up to
-                                 1000: every N-th frame of a stream is one. In between, boxes are propagated and no new
-                                 people are found; frames without people cost nothing. A frame of another size or of
-                                 another roll is a key frame. If each person has a crop (`person_crops`), only the crops
-                                 are computed in between. */
+  maq_model_options model;     /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */
+  maq_densepose_preset preset; /* default MAQ_DENSEPOSE_PRESET_STREAM */
+  int32_t long_side_px;        /* images are scaled to this long side, 32 to 2048. 0 (default): automatic. The bundle's
+                                  value finds near people. If it shows small people or nobody, larger images are also
+                                  searched at 480 pixels. In a stream (frames with a `sequence` above 0), earlier
+                                  frames count, too. */
+  float score_threshold;       /* minimum score of a person, up to 1; 0 (default): the bundle's value */
+  int32_t max_people;          /* 1 to 255, best scores first; 0 (default): the bundle's value */
+  int32_t max_proposals;       /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes
+                                  are faster and may miss people in a crowd. */
+  int32_t key_frame_interval;  /* 0 (default) and 1: every frame is a key frame, in which people are detected. N, up to
+                                  1000: every N-th frame of a stream is one. In between, boxes are propagated and no new
+                                  people are found; frames without people cost nothing. A frame of another size or of
+                                  another roll is a key frame. If each person has a crop (`person_crops`), only the crops
+                                  are computed in between. */
   int32_t min_person_height_px;     /* people less tall than this in the frame may be missed, up to 100000; larger is
                                        faster; 0 (default): no limit */
   maq_densepose_detail detail;      /* default MAQ_DENSEPOSE_DETAIL_SURFACE */
-  maq_densepose_crops person_crops; /* default MAQ_DENSEPOSE_CROPS_OFF */
-  int32_t person_crop_px;           /* side of a crop, 64 to 512; 0 (default): 192. Smaller is faster. */
+  maq_densepose_crops person_crops; /* default MAQ_DENSEPOSE_CROPS_DEFAULT */
+  int32_t person_crop_px;           /* side of a crop, 64 to 512; 0 (default): 192, of photos 256. Smaller is faster. */
   uint32_t result_pool_size;        /* results the app may hold at once, 1 to 64; 0 (default): 4 */
 } maq_densepose_config;
 

@@ -18,6 +18,8 @@ constexpr double kFullCircle_rad = 2 * 3.14159265358979323846;
 constexpr double kMinKeptBody = 0.25;
 // Fractions of a box's width and height, on each side.
 constexpr float kSideMargin = 0.03f, kEndMargin = 0.05f;
+// In a stream, edges of a region that move by less than this fraction of its long side stay.
+constexpr float kSteadyRegionShift = 0.02f;
 
 // Puts the bundle's values in place of zeros.
 DensePoseSettings resolved(DensePoseSettings settings, const DensePoseSpec& spec) {
@@ -38,6 +40,14 @@ Box region_of(const Box& box, const NetworkSize& input) {
   clip_box(region, float(input.width_px), float(input.height_px));
   return region;
 }
+
+bool is_near(const Box& a, const Box& b) {
+  const float shift =
+      std::max({std::abs(a.x0 - b.x0), std::abs(a.y0 - b.y0), std::abs(a.x1 - b.x1), std::abs(a.y1 - b.y1)});
+  return shift < kSteadyRegionShift * std::max(a.width(), a.height());
+}
+
+int long_side(const NetworkSize& size) { return std::max(size.width_px, size.height_px); }
 
 Box scaled(const Box& box, float x, float y) { return {box.x0 * x, box.y0 * y, box.x1 * x, box.y1 * y}; }
 
@@ -78,7 +88,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
 }
 
 void DensePose::run(const ImageView& image, DensePoseResult& result, bool follows) {
-  scales_.set_stream(follows || settings_.key_frame_interval > 1);
+  is_stream_ = follows || settings_.key_frame_interval > 1;
+  scales_.set_stream(is_stream_);
   try {
     map_image(image, result);
     cancel_->check();  // a later cancel() is for the next run
@@ -94,6 +105,7 @@ void DensePose::reset() {
   tracked_.clear();
   tracks_crops_ = false;
   scales_.reset();
+  steady_labels_.begin(false);
 }
 
 void DensePose::set_quality(int key_frame_interval, int long_side_px) {
@@ -107,7 +119,11 @@ void DensePose::begin_frame(const ImageView& image, DensePoseStats& stats) {
   const int roll_steps = int(std::lround(roll_rad / kRollStepRad));
   const bool is_same_stream =
       image.width_px == image_width_px_ && image.height_px == image_height_px_ && roll_steps == roll_steps_;
-  if (!is_same_stream) scales_.reset();
+  if (!is_same_stream) {
+    scales_.reset();
+    tracked_.clear();
+  }
+  steady_labels_.begin(is_stream_ && is_same_stream);
   image_width_px_ = image.width_px;
   image_height_px_ = image.height_px;
   roll_steps_ = roll_steps;
@@ -204,11 +220,13 @@ void DensePose::add_people(const ImageView& image, const std::vector<ScoredBox>&
   for (size_t i = 0; i < found.size(); ++i) {
     if (keeps != nullptr && (*keeps)[i] == 0) continue;
     const ScoredBox& person = found[i];
-    const Box region = region_of(person.box, seen_.size);
+    const Box region = region_for(person.box);
     mapper_->add(detector_->trunk().features()[0], region);
     MappedPerson mapped;
     mapped.found = person;
     mapped.mapper = mapper_.get();
+    mapped.input_region = region;
+    mapped.input_side_px = long_side(seen_.size);
     if (seen_.roll_steps == 0) {
       mapped.box = scaled(person.box, float(seen_.to_image.xx), float(seen_.to_image.yy));
       clip_box(mapped.box, float(image.width_px), float(image.height_px));
@@ -218,6 +236,16 @@ void DensePose::add_people(const ImageView& image, const std::vector<ScoredBox>&
     }
     mapped_.push_back(mapped);
   }
+}
+
+Box DensePose::region_for(const Box& box) const {
+  const Box region = region_of(box, seen_.size);
+  if (!is_stream_) return region;
+  for (const MappedPerson& person : tracked_) {
+    if (person.input_side_px == long_side(seen_.size) && is_near(region, person.input_region))
+      return person.input_region;
+  }
+  return region;
 }
 
 void DensePose::drop_people(const std::vector<uint8_t>& keeps) {
@@ -246,7 +274,7 @@ void DensePose::map_people(const ImageView& image, DensePoseStats& stats) {
   stats.dense_head_ms = float(stage.lap_ms());
   if (settings_.crops != PersonCrops::kOff) {
     trace.next("maquette crops");
-    crops_->choose(mapped_, seen_.up);
+    crops_->choose(mapped_, seen_.up, is_stream_ ? &tracked_ : nullptr);
     drop_unlikely();
     stats.crops = crops_->run(image, mapped_, *cancel_, &stats.provider);
     drop_unlikely();
@@ -279,6 +307,7 @@ void DensePose::paint_people(DensePoseResult& result) {
   Stopwatch stage;
   const TraceSection trace("maquette decode");
   const DenseHeadSpec& spec = spec_.dense_head;
+  const bool ran_crops_alone = !result.stats.key_frame && tracks_crops_;
   tracked_.clear();
   tracks_crops_ = false;
   if (mapped_.empty()) return;
@@ -290,25 +319,28 @@ void DensePose::paint_people(DensePoseResult& result) {
     if (!settings_.surface) logits.charts = nullptr;
     const uint8_t number = uint8_t(result.people.size() + 1);
     const PersonCrop* const view = person.crop ? &*person.crop : person.first_view ? &*person.first_view : nullptr;
-    const DecodeCounts counts =
-        view != nullptr ? paint_rotated_person(logits, view->to_cells(logits.size), number, spec.mask_threshold,
-                                               spec.min_visible_fraction, decode_memory_, result.planes)
-                        : paint_person(logits, person.region, number, spec.mask_threshold, spec.min_visible_fraction,
-                                       decode_memory_, result.planes);
+    const AffineMap to_cells =
+        view != nullptr ? view->to_cells(logits.size) : map_of_cells(person.region, logits.size).inverse();
+    steady_labels_.favour(to_cells, logits, person.answer.labels);
+    const DecodeCounts counts = view != nullptr
+                                    ? paint_rotated_person(logits, to_cells, number, spec.mask_threshold,
+                                                           spec.min_visible_fraction, decode_memory_, result.planes)
+                                    : paint_person(logits, person.region, number, spec.mask_threshold,
+                                                   spec.min_visible_fraction, decode_memory_, result.planes);
     result.stats.decoded.body_pixels += counts.body_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
     // A box without a body is a false alarm; a box whose body is painted already shows the same person again.
     if (counts.body_pixels == 0) continue;
+    steady_labels_.keep(to_cells, spec.mask_threshold, decode_memory_);
     if (view != nullptr) {
-      Box body = person_bounds(logits.size, view->to_cells(logits.size).inverse(), spec.mask_threshold, decode_memory_);
+      Box body = person_bounds(logits.size, to_cells.inverse(), spec.mask_threshold, decode_memory_);
       clip_box(body, float(result.planes.width_px), float(result.planes.height_px));
       person.box = person.first_view ? body : between(person.box, body);
     }
     const bool is_lost = double(counts.body_pixels) < kMinKeptBody * double(person.body_pixels);
     person.body_pixels = counts.body_pixels;
-    if (tracks_crops_) {
-      crops_->follow(person, result.stats.key_frame, result.planes.width_px, result.planes.height_px, seen_.up,
-                     decode_memory_);
+    if (is_stream_ && person.crop) {
+      crops_->follow(person, !ran_crops_alone, result.planes.width_px, result.planes.height_px, decode_memory_);
     }
     result.people.push_back({person.box, person.found.score});
     if (!(tracks_crops_ && is_lost)) tracked_.push_back(person);

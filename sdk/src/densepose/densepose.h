@@ -13,6 +13,7 @@
 #include "densepose/detector/person_detector.h"
 #include "densepose/frame_budget.h"
 #include "densepose/surface/dense_decode.h"
+#include "densepose/surface/steady_labels.h"
 #include "densepose/surface/surface_grid.h"
 #include "densepose/surface/surface_mapper.h"
 #include "nn/bundle.h"
@@ -91,6 +92,8 @@ class DensePose {
   const std::vector<ScoredBox>& run_detector(const ImageView& image, const std::vector<ScoredBox>* followed,
                                              DensePoseStats& stats);
   void add_people(const ImageView& image, const std::vector<ScoredBox>& found, const std::vector<uint8_t>* keeps);
+  // Returns the region of a person that the dense head sees: in a stream that of the previous frame, if it is near.
+  Box region_for(const Box& box) const;
   void drop_people(const std::vector<uint8_t>& keeps);
   void drop_beyond(size_t count);  // the lowest scores
   // Maps the people of `mapped_`, then crops of the people who gain by one.
@@ -117,6 +120,7 @@ class DensePose {
   // Scratch of a frame, kept so that the next one takes nothing from the heap.
   std::vector<MappedPerson> mapped_;
   DecodeMemory decode_memory_;
+  SteadyLabels steady_labels_;
   // People of the previous frame, to be followed: by their boxes or, if all have crops, in the crops alone.
   std::vector<MappedPerson> tracked_;
   std::vector<ScoredBox> tracked_boxes_;
@@ -125,6 +129,7 @@ class DensePose {
   bool tracks_crops_ = false;
   int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;
+  bool is_stream_ = false;  // the image follows the previous one
 };
 
 }  // namespace maq

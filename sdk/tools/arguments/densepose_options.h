@@ -9,7 +9,8 @@ struct ModelOptions : NetworkOptions {
   int max_proposals = 0;
   int key_frames = 0;
   int min_person_height_px = 0;
-  std::string crops = "off";
+  std::string preset;  // empty: by the source
+  std::string crops;   // empty: the preset's
   int crop_px = 0;
   bool no_surface = false;
 };
@@ -19,5 +20,5 @@ void add_model_options(CLI::App& command, ModelOptions& options);
 // The folder of the bundle that was named, or else of the default one. Throws std::runtime_error without any.
 std::string bundle_of(const ModelOptions& options);
 
-// `bundle` must outlive the configuration.
-maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle);
+// `bundle` must outlive the configuration. `is_photo`: the preset where none was named.
+maq_densepose_config config_of(const ModelOptions& options, const std::string& bundle, bool is_photo = false);

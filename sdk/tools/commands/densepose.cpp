@@ -144,15 +144,20 @@ int run_densepose(const DensePoseOptions& options) {
   const std::vector<SourceArgument> arguments = parse_sources(options.sources);
   const std::string bundle = bundle_of(options.model);
   const maquette::Context context = open_context();
-  std::unique_ptr<maquette::DensePose> densepose;
+  std::unique_ptr<maquette::DensePose> for_photos, for_streams;
   Timings timings;
-  const auto load = [&] {
-    densepose = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle));
+  const auto model_for = [&](const maquette::Source& source) -> std::unique_ptr<maquette::DensePose>& {
+    return is_clip(source) ? for_streams : for_photos;
+  };
+  const auto load = [&](const maquette::Source& source) {
+    std::unique_ptr<maquette::DensePose>& model = model_for(source);
+    if (model != nullptr) return;
+    model = std::make_unique<maquette::DensePose>(context, config_of(options.model, bundle, !is_clip(source)));
     constexpr double degree_rad = 3.14159265358979323846 / 180;
-    densepose->set_roll(float(options.roll_deg * degree_rad));
+    model->set_roll(float(options.roll_deg * degree_rad));
   };
   const auto run = [&](const SourceArgument& argument, maquette::Source& source) {
-    run_source(options, argument, context, source, *densepose, timings);
+    run_source(options, argument, context, source, *model_for(source), timings);
   };
   const int exit_code = run_sources(context, arguments, load, run);
   if (timings.frames() > 0 && !options.json) timings.print();
@@ -195,7 +200,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"
-      "  maquette densepose holiday/*.jpg --out results --crops auto\n"
+      "  maquette densepose holiday/*.jpg --out results --preset stream\n"
       "  maquette densepose lying_phone.jpg --out results --roll 90\n"
       "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
       "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");

@@ -177,7 +177,8 @@ int run_edges(const EdgesOptions& options) {
   const std::string bundle = bundle_or_default(kEdgesNetworks, options.network.bundle);
   const maquette::Context context = open_context();
   std::unique_ptr<maquette::Edges> edges;
-  const auto load = [&] {
+  const auto load = [&](const maquette::Source&) {
+    if (edges != nullptr) return;
     maq_edges_config config = maquette::default_edges_config();
     config.model.bundle_path = bundle.c_str();
     config.model.threads = options.network.threads;

@@ -29,7 +29,7 @@ bool print_networks() {
   for (const SystemNetworks& networks : networks_of_build()) {
     const std::string bundle = default_bundle(networks);
     std::error_code error;
-    std::string text = bundle.empty() ? "not installed; `maquette doctor` says how to install them" : bundle;
+    std::string text = bundle.empty() ? "not installed; a command that needs them says how to install them" : bundle;
     if (!bundle.empty() && !std::filesystem::exists(std::filesystem::u8path(bundle) / "manifest.json", error)) {
       text = "missing: " + bundle + " has no manifest.json; see " + networks.variable;
       are_there = false;

@@ -6,7 +6,6 @@
 #include <memory>
 #include <set>
 #include <stdexcept>
-#include <utility>
 
 #include "interrupt.h"
 #include "output/progress_bar.h"
@@ -51,11 +50,10 @@ std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts)
 }
 
 int run_sources(const maquette::Context& context, const std::vector<SourceArgument>& arguments,
-                const std::function<void()>& load,
+                const std::function<void(const maquette::Source&)>& load,
                 const std::function<void(const SourceArgument&, maquette::Source&)>& run) {
   catch_interrupts();
   int failed = 0;
-  bool is_loaded = false;
   for (const SourceArgument& argument : arguments) {
     if (interrupted()) break;
     std::unique_ptr<maquette::Source> source;
@@ -66,7 +64,7 @@ int run_sources(const maquette::Context& context, const std::vector<SourceArgume
       ++failed;
       continue;
     }
-    if (!std::exchange(is_loaded, true)) load();
+    load(*source);
     try {
       run(argument, *source);
     } catch (const OutputLost&) {

@@ -24,11 +24,11 @@ void add_frame_limits(CLI::App& command, FrameLimits& limits);
 // Throws std::runtime_error if files of two sources would have the same name.
 std::vector<SourceArgument> parse_sources(const std::vector<std::string>& texts);
 
-// Opens each source and calls `run` with it, until Ctrl-C; before the first, `load`, whose errors are the command's. A
-// source that cannot be opened, and an exception of `run`, are printed. The rest of a batch goes on, except after
+// Opens each source and calls `load` and `run` with it, until Ctrl-C. Errors of `load` are the command's. A source that
+// cannot be opened, and an exception of `run`, are printed. The rest of a batch goes on, except after
 // OutputLost. Returns the exit code.
 int run_sources(const maquette::Context& context, const std::vector<SourceArgument>& arguments,
-                const std::function<void()>& load,
+                const std::function<void(const maquette::Source&)>& load,
                 const std::function<void(const SourceArgument&, maquette::Source&)>& run);
 
 // A frame, and the beginning of its file names: in clips with its number.

@@ -78,8 +78,21 @@ TEST_F(CommandLine, WritesTheFilesOfAnImageAndSaysWhatItFound) {
   EXPECT_EQ(json["width"], 320);
   EXPECT_EQ(json["height"], 256);
   ASSERT_EQ(json["people"].size(), 2u);
-  EXPECT_NEAR(json["people"][0]["box"][0].get<double>(), 67.2, 0.01);
+  EXPECT_NEAR(json["people"][0]["box"][0].get<double>(), 67, 1);
   EXPECT_GT(json["people"][0]["score"].get<double>(), 0.9);
+}
+
+TEST_F(CommandLine, ImagesGetCropsAndClipsDoNotUnlessAPresetIsNamed) {
+  write_clip("clip.avi", 2);
+  const auto crops = [&](const std::string& arguments) {
+    const Outcome result = run("densepose --json --out o " + arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out.substr(0, result.out.find('\n'))).at("crops").get<int>();
+  };
+  EXPECT_EQ(crops("two.png"), 2);
+  EXPECT_EQ(crops("clip.avi"), 0);
+  EXPECT_EQ(crops("two.png --preset stream"), 0);
+  EXPECT_EQ(crops("two.png --crops off"), 0);
 }
 
 TEST_F(CommandLine, TakesABarePathAndNamesWithOddCharacters) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "support/samples/tiny_dense_pose.h"
 #include "support/samples/tiny_people.h"
 
@@ -42,7 +44,7 @@ class CropPass : public ::testing::Test {
 
 TEST_F(CropPass, EverybodyGetsACropWhereAllAreAskedFor) {
   std::vector<maq::MappedPerson> people = mapped({40, 20, 240, 230});
-  crops_.choose(people, kUp);
+  crops_.choose(people, kUp, nullptr);
   ASSERT_TRUE(people[0].crop);
   EXPECT_GT(people[0].crop->box.width(), 0);
   EXPECT_GE(people[0].confidence, 0);
@@ -51,13 +53,31 @@ TEST_F(CropPass, EverybodyGetsACropWhereAllAreAskedFor) {
 TEST_F(CropPass, WithAutoOnlySmallAndLeaningPeopleGetACrop) {
   tiny_.settings.crops = maq::PersonCrops::kAuto;
   std::vector<maq::MappedPerson> small = mapped({64, 84, 96, 116});
-  crops_.choose(small, kUp);
+  crops_.choose(small, kUp, nullptr);
   EXPECT_TRUE(small[0].crop);
+}
+
+TEST_F(CropPass, InAStreamAPersonWhoStaysKeepsTheCrop) {
+  std::vector<maq::MappedPerson> before = mapped({40, 20, 240, 230});
+  crops_.choose(before, kUp, nullptr);
+  ASSERT_TRUE(before[0].crop);
+  before[0].crop->to_image.shift_x += 0.5;  // as a crop of another frame
+  std::vector<maq::MappedPerson> people = mapped({40, 20, 240, 230});
+  const std::vector<maq::MappedPerson> nobody;
+  for (const std::vector<maq::MappedPerson>* previous : {&std::as_const(before), &nobody}) {
+    crops_.choose(people, kUp, previous);
+    ASSERT_TRUE(people[0].crop);
+    EXPECT_EQ(people[0].had_crop, previous == &before);
+    EXPECT_EQ(people[0].crop->to_image.shift_x == before[0].crop->to_image.shift_x, previous == &before);
+  }
+  before[0].body = {250, 240, 300, 250};  // somebody else
+  crops_.choose(people, kUp, &before);
+  EXPECT_FALSE(people[0].had_crop);
 }
 
 TEST_F(CropPass, ACropIsRunAndItsAnswerKeptUnlessItIsLessConfident) {
   std::vector<maq::MappedPerson> people = mapped({64, 84, 96, 116});
-  crops_.choose(people, kUp);
+  crops_.choose(people, kUp, nullptr);
   for (const float first : {0.0f, 1.0f}) {
     std::vector<maq::MappedPerson> again = people;
     again[0].confidence = first;
@@ -68,7 +88,7 @@ TEST_F(CropPass, ACropIsRunAndItsAnswerKeptUnlessItIsLessConfident) {
     EXPECT_TRUE(is_kept || first == 1);
     EXPECT_TRUE(is_kept || again[0].confidence == first) << "the first answer stays";
     people = mapped({64, 84, 96, 116});  // the mapper's memory was used
-    crops_.choose(people, kUp);
+    crops_.choose(people, kUp, nullptr);
   }
 }
 

@@ -90,6 +90,13 @@ TEST(PersonCrop, WithoutATorsoThereIsNoAxis) {
   EXPECT_FALSE(outside.axis());
 }
 
+TEST(PersonCrop, AFaceWithSomeCellsOfTheShouldersHasNoAxis) {
+  for (const float bottom : {92.0f, 125.0f}) {  // the torso begins at 90 and is 40 px wide, the head 25 high
+    Doll doll({200, 130}, 0, {175, 60, 225, bottom});
+    EXPECT_EQ(doll.axis().has_value(), bottom == 125);
+  }
+}
+
 TEST(PersonCrop, UThatIsNoNumberLeavesTheDirectionOfTheHead) {
   Doll doll({200, 130}, 60, kWideBox);
   doll.lose_u();
@@ -148,6 +155,51 @@ TEST(PersonCrop, AMarginMakesRoomForMotionOnAllSides) {
   EXPECT_NEAR(wide.y0, tight.y0 - room, 0.1);
   EXPECT_NEAR(wide.x1, tight.x1 + room, 0.1);
   EXPECT_NEAR(wide.y1, tight.y1 + room, 0.1);
+}
+
+TEST(PersonCrop, InAStreamTheRotationStaysUnlessThePersonTurns) {
+  Doll doll({200, 130}, 40, kWideBox);
+  const maq::PersonCrop before = doll.crop(doll.axis());
+  EXPECT_LT(degrees_between(before.up(), *doll.axis()), 1e-6);
+  const auto lean = [](double degrees) { return Point{std::sin(degrees * kRadians), -std::cos(degrees * kRadians)}; };
+  for (const double degrees : {28.0, 52.0}) {
+    EXPECT_LT(degrees_between(steady_axis(lean(degrees), before), before.up()), 1e-6);
+  }
+  EXPECT_LT(degrees_between(steady_axis(std::nullopt, before), before.up()), 1e-6);
+  for (const double degrees : {20.0, 60.0}) {
+    EXPECT_LT(degrees_between(steady_axis(lean(degrees), before), lean(degrees)), 1e-6);
+  }
+}
+
+TEST(PersonCrop, InAStreamTheCropStaysWhileThePersonHardlyMoves) {
+  Doll doll({200, 130}, 40, kWideBox);
+  const maq::PersonCrop before = doll.crop(doll.axis(), 0.05);
+  const auto stays = [&](const Point& middle, double lean) {
+    Doll moved(middle, lean, kWideBox);
+    const maq::PersonCrop wanted = moved.crop(moved.axis(), 0.05);
+    const maq::PersonCrop crop = steady_crop(wanted, before, 0.03 * 256);
+    const maq::PersonCrop& expected = crop.to_image.shift_x == before.to_image.shift_x ? before : wanted;
+    EXPECT_EQ(crop.to_crop.shift_y, expected.to_crop.shift_y);
+    EXPECT_EQ(crop.box.x0, expected.box.x0);
+    return &expected == &before;
+  };
+  EXPECT_TRUE(stays({200, 130}, 40));
+  EXPECT_TRUE(stays({201, 130.5}, 40));
+  EXPECT_FALSE(stays({206, 130}, 40)) << "moved by a twentieth of the height";
+  EXPECT_FALSE(stays({200, 130}, 60)) << "turned";
+}
+
+TEST(PersonCrop, ASideAtWhichTheBodyHasNoEndGetsNoMargin) {
+  Doll whole({200, 130}, 0, kWideBox), cut({200, 130}, 0, {190, 75, 300, 165});  // the torso ends at 180, 220 and 170
+  const maq::OpenSides none = open_sides(kCells, 0.5f, whole.memory()), open = open_sides(kCells, 0.5f, cut.memory());
+  EXPECT_FALSE(none.left || none.top || none.right || none.bottom);
+  EXPECT_TRUE(open.left && open.top && open.bottom);
+  EXPECT_FALSE(open.right);
+  const Box box = box_in_image(crop_around_person(kCells, cut.map(), std::nullopt, 0.5f, 0.1, 256, cut.memory(), open));
+  EXPECT_NEAR(box.x0, 190, 0.1);
+  EXPECT_NEAR(box.y0, 75, 0.1);
+  EXPECT_NEAR(box.x1, 220 + 0.1 * 90, 2);
+  EXPECT_NEAR(box.y1, 165, 0.1);
 }
 
 TEST(PersonCrop, TheAxisAndTheBoundsAreFoundInATurnedCropToo) {

@@ -382,6 +382,40 @@ TEST_F(ShippedNetworks, ARollBeginsAKeyFrameWhereItsStepChanges) {
   EXPECT_TRUE(is_key_frame(-5));
 }
 
+TEST_F(ShippedNetworks, InAStillStreamFewerLabelsChangeThanInSingleImagesWithCropsToo) {
+  // The share of body pixels whose part changes from one frame to the next, with the noise of a sensor.
+  const auto flips = [&](const maq::DensePoseSettings& settings, bool follows) {
+    maq::DensePose densepose = make(settings);
+    cv::RNG random(1);
+    cv::Mat noise(photo_.size(), CV_16SC3), noisy;
+    std::vector<uint8_t> before;
+    double changed = 0, body = 0;
+    for (int frame = 0; frame < 9; ++frame) {
+      random.fill(noise, cv::RNG::NORMAL, 0, 6);
+      cv::add(photo_, noise, noisy, cv::noArray(), CV_8U);
+      maq::DensePoseResult result;
+      densepose.run(view_of(noisy), result, follows);
+      const std::vector<uint8_t>& part = result.planes.part;
+      for (size_t i = 0; i < before.size(); ++i) {
+        if (before[i] == 0 || part[i] == 0) continue;
+        ++body;
+        changed += before[i] != part[i];
+      }
+      before = part;
+    }
+    EXPECT_GT(body, 8 * 0.2 * double(photo_.total()));
+    return changed / std::max(body, 1.0);
+  };
+  maq::DensePoseSettings settings;
+  const double single = flips(settings, false), stream = flips(settings, true);
+  settings.crops = maq::PersonCrops::kAll;
+  settings.key_frame_interval = 4;
+  const double crops = flips(settings, true);
+  RecordProperty("flips", std::to_string(single) + " " + std::to_string(stream) + " " + std::to_string(crops));
+  EXPECT_LT(stream, 0.5 * single);
+  EXPECT_LT(crops, 0.5 * single);
+}
+
 TEST_F(ShippedNetworks, FramesOfOneColourAndCheckerboardsShowNoPeople) {
   maq::DensePose densepose = make();
   maq::DensePoseResult result;

@@ -126,7 +126,7 @@ def test_the_node_of_comfyui_makes_hints_and_masks(result, frame):
     given = {name: kind[0][0] if isinstance(kind[0], list) else kind[1].get("default")
              for name, kind in node.INPUT_TYPES()["required"].items() if name != "image"}  # fmt: skip
     batch = torch.from_numpy(np.stack([frame.pixels()] * 2).astype(np.float32) / 255)
-    hints, masks = getattr(node(), node.FUNCTION)(batch, **given | {"person_crops": "off"})
+    hints, masks = getattr(node(), node.FUNCTION)(batch, **given | {"preset": "stream"})
     assert hints.shape == (2, 240, 320, 3)
     assert masks.shape == (2, 240, 320)
     expected = visualize(maquette.DensePose().run(frame.pixels()))

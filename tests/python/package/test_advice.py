@@ -123,7 +123,7 @@ def test_missing_folders_are_made(people, tmp_path):
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda: maquette.DensePose(person_crops=True), ValueError, "person_crops is True; it is one of off, auto"),
+        (lambda: maquette.DensePose(person_crops=True), ValueError, "person_crops is True; it is one of default, auto"),
         (lambda: maquette.DensePose(long_side=384), TypeError, r"did you mean long_side_px\?"),
         (lambda: maquette.Source(0), TypeError, '"camera:" is the first camera'),
         (lambda: maquette.Pipeline(0), TypeError, "maquette sources"),

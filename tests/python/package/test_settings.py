@@ -69,7 +69,11 @@ def test_the_package_itself_has_types():
 @pytest.mark.parametrize(
     ("call", "error", "text"),
     [
-        (lambda: maquette.DensePose(person_crops="some"), ValueError, 'person_crops is "some"; it is one of off, auto'),
+        (
+            lambda: maquette.DensePose(person_crops="some"),
+            ValueError,
+            'person_crops is "some"; it is one of default, auto',
+        ),
         (lambda: maquette.DensePose(long_side_px="384"), TypeError, "long_side_px is '384'; .* type int32_t"),
         (lambda: maquette.DensePose(threads=2**40), TypeError, "threads is 1099511627776"),
         (lambda: maquette.Predictor("motoin"), ValueError, "auto, last, motion, refined, sampled"),

@@ -22,7 +22,18 @@ maq_densepose_config default_densepose_config() {
 }
 
 constexpr int32_t kDefaultOpacity = 180;
+constexpr int kPhotoCropSidePx = 256;
 constexpr uint32_t kDefaultResultPoolSize = 4;
+
+PersonCrops crops_of(const maq_densepose_config& config) {
+  switch (config.person_crops) {
+    case MAQ_DENSEPOSE_CROPS_AUTO: return PersonCrops::kAuto;
+    case MAQ_DENSEPOSE_CROPS_ALL: return PersonCrops::kAll;
+    case MAQ_DENSEPOSE_CROPS_OFF: return PersonCrops::kOff;
+    case MAQ_DENSEPOSE_CROPS_DEFAULT: break;
+  }
+  return config.preset == MAQ_DENSEPOSE_PRESET_PHOTO ? PersonCrops::kAll : PersonCrops::kOff;
+}
 
 // NULL for a number that is not a part's.
 const BodyPart* body_part(int32_t part) {
@@ -40,6 +51,8 @@ maq_densepose_config read_densepose_config(const maq_densepose_config* given, co
 DensePoseSettings densepose_settings(const maq_densepose_config& config, const char* name) {
   const auto field = [name](const char* member) { return concatenate(name, ".", member); };
   require_model_options(field("model"), config.model);
+  require_range(field("preset"), number_in(config.preset), int32_t(MAQ_DENSEPOSE_PRESET_STREAM),
+                int32_t(MAQ_DENSEPOSE_PRESET_PHOTO));
   if (config.long_side_px != 0) require_range(field("long_side_px"), config.long_side_px, 32, 2048);
   require_range(field("score_threshold"), config.score_threshold, 0.0f, 1.0f);
   if (config.max_people != 0) require_range(field("max_people"), config.max_people, 1, 255);
@@ -49,8 +62,8 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   require_range(field("min_person_height_px"), config.min_person_height_px, 0, 100000);
   require_range(field("detail"), number_in(config.detail), int32_t(MAQ_DENSEPOSE_DETAIL_SURFACE),
                 int32_t(MAQ_DENSEPOSE_DETAIL_PART));
-  require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_DENSEPOSE_CROPS_OFF),
-                int32_t(MAQ_DENSEPOSE_CROPS_ALL));
+  require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_DENSEPOSE_CROPS_DEFAULT),
+                int32_t(MAQ_DENSEPOSE_CROPS_OFF));
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
   DensePoseSettings settings;
   settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
@@ -61,10 +74,10 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   settings.key_frame_interval = std::max(config.key_frame_interval, 1);
   settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
-  settings.crops = config.person_crops == MAQ_DENSEPOSE_CROPS_AUTO  ? PersonCrops::kAuto
-                   : config.person_crops == MAQ_DENSEPOSE_CROPS_ALL ? PersonCrops::kAll
-                                                                    : PersonCrops::kOff;
+  settings.crops = crops_of(config);
   settings.crop_side_px = config.person_crop_px;
+  if (settings.crop_side_px == 0 && config.preset == MAQ_DENSEPOSE_PRESET_PHOTO)
+    settings.crop_side_px = kPhotoCropSidePx;
   settings.provider = config.model.provider;
   return settings;
 }

@@ -8,15 +8,14 @@
 #include <charconv>
 #include <chrono>
 #include <climits>
-#include <cstdio>
 #include <cstring>
-#include <random>
 #include <string_view>
 #include <thread>
 
 #include "core/error.h"
 #include "core/files/blocked_write_signals.h"
 #include "core/files/file_calls.h"
+#include "core/files/random_digits.h"
 
 namespace maq {
 namespace {
@@ -52,14 +51,6 @@ std::string without_links(std::string path) {
     path = (link[0] == '/' ? "" : folder_of(path) + "/") + std::string(link, size_t(length));
   }
   return path;
-}
-
-// Unpredictable, so that no other program can put something in its place beforehand.
-std::string random_digits() {
-  std::random_device random;
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%08x%08x", random(), random());
-  return digits;
 }
 
 }  // namespace

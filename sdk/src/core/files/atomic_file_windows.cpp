@@ -7,26 +7,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <random>
 
 #include "core/error.h"
 #include "core/files/file_calls.h"
+#include "core/files/random_digits.h"
 #include "core/wide_path.h"
 
 namespace maq {
-namespace {
-
-// Unpredictable, so that no other program can put something in its place beforehand.
-std::string random_digits() {
-  std::random_device random;
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%08x%08x", random(), random());
-  return digits;
-}
-
-}  // namespace
 
 // Files alone: pipes and devices have no names here that a user would write to.
 AtomicFile::AtomicFile(std::string path, const char* temporary_extension) : path_(std::move(path)), target_(path_) {

@@ -22,9 +22,14 @@ struct MappedPerson {
   float to_seen = 1;                     // pixels of the frame's last input in a pixel of the person's input
   Box box;                               // in pixels of the image
   Box region;                            // in pixels of the image: seen by the dense head, wider than `box`
+  Box input_region;                      // the same in pixels of the network's input
+  int input_side_px = 0;                 // long side of this input
+  Box body;                              // in pixels of the image: bounds of the surface
   Box beyond_body;                       // from the bounds of the painted body to `box`, of the latest key frame
   std::optional<PersonCrop> first_view;  // the region of the first answer, in an image that was rotated
   std::optional<PersonCrop> crop;
+  bool had_crop = false;            // in the previous frame of the stream
+  OpenSides open_sides;             // of the crop of the latest key frame
   float confidence = 0;             // of the answer in use
   int64_t body_pixels = 0;          // when last painted
   SurfaceAnswer answer;             // of the crop if there is one
@@ -45,15 +50,16 @@ class CropPass {
   // Returns the score with the confidence of the answer.
   float score_of(const MappedPerson& person) const;
 
-  // Gives crops to the people who gain by one. `up`: in the image, a unit vector.
-  void choose(std::vector<MappedPerson>& people, const Point& up);
+  // Gives crops to the people who gain by one. `up`: in the image, a unit vector. `previous`: in a stream,
+  // the people of the previous frame, whose crops stay the same as far as possible; nullptr for a still image.
+  void choose(std::vector<MappedPerson>& people, const Point& up, const std::vector<MappedPerson>* previous);
   // Runs trunk and dense head over the crops of `people`. A new answer replaces the first one unless it is clearly less
   // confident; then the person loses the crop. Returns the number of crops; `*provider` is set if there are any.
   int run(const ImageView& image, std::vector<MappedPerson>& people, RunCancel& cancel, maq_provider* provider);
-  // Gives a person who was just painted the crop for the next frame, and between key frames a new box. `painted` holds
+  // Gives a person who was just painted the crop for the next frame, rotated as before, and without `has_new_box` (of
+  // the box head) a new box. `painted` holds
   // the classified cells of the answer; the sizes are the image's.
-  void follow(MappedPerson& person, bool is_key_frame, int width_px, int height_px, const Point& up,
-              const DecodeMemory& painted) const;
+  void follow(MappedPerson& person, bool has_new_box, int width_px, int height_px, const DecodeMemory& painted) const;
 
  private:
   const DensePoseSpec& spec_;

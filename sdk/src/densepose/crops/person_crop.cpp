@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace maq {
 namespace {
@@ -11,6 +12,11 @@ constexpr double kContext = 1.15;  // the crop's side over the long side of the 
 // Counts of cells of the dense head; fewer give no direction.
 constexpr int kMinTorsoCells = 16, kMinHeadCells = 6;
 constexpr double kMinAgreement = 0.1;  // length of the sum of two unit vectors
+// The smallest fraction of torso in the person's cells that gives a direction.
+constexpr double kMinTorsoFraction = 0.15;
+// In a stream a smaller change of the axis leaves the crop's rotation. The axis of a first answer is off by 8.5 degrees
+// in the median, and the networks know people who lean by 20.
+constexpr double kSteadyDegrees = 15;
 
 // Parts count from 0 here, as in DecodeMemory.
 bool is_torso(int part) { return part == 0 || part == 1; }
@@ -89,6 +95,23 @@ AffineMap PersonCrop::to_cells(int cells) const {
   return map;
 }
 
+Point PersonCrop::up() const { return unit({-to_image.xy, -to_image.yy}); }
+
+OpenSides open_sides(int size, float mask_threshold, const DecodeMemory& memory) {
+  const float min_odds = min_log_odds(mask_threshold);
+  const auto shows = [&](int row, int column) {
+    return memory.odds[size_t(row) * size_t(size) + size_t(column)] > min_odds;
+  };
+  OpenSides open;
+  for (int i = 0; i < size; ++i) {
+    open.left = open.left || shows(i, 0);
+    open.right = open.right || shows(i, size - 1);
+    open.top = open.top || shows(0, i);
+    open.bottom = open.bottom || shows(size - 1, i);
+  }
+  return open;
+}
+
 AffineMap map_of_cells(const Box& box, int cells) {
   AffineMap map;
   map.xx = double(box.width()) / cells, map.shift_x = double(box.x0);
@@ -100,11 +123,14 @@ std::optional<Point> find_body_axis(const DenseLogits& logits, const AffineMap& 
                                     const DecodeMemory& memory) {
   const float min_odds = min_log_odds(mask_threshold);
   SlopeFit torso, head;
+  int body_cells = 0;
   for (int row = 0; row < logits.size; ++row) {
     for (int column = 0; column < logits.size; ++column) {
       const size_t cell = size_t(row) * size_t(logits.size) + size_t(column);
       const int part = memory.best[cell];
-      if (!(memory.odds[cell] > min_odds) || !(is_torso(part) || is_head(part))) continue;
+      if (!(memory.odds[cell] > min_odds)) continue;
+      ++body_cells;
+      if (!(is_torso(part) || is_head(part))) continue;
       const Point at = cells_to_image({column + 0.5, row + 0.5});
       if (is_head(part)) {
         head.add(at, 0);
@@ -114,7 +140,7 @@ std::optional<Point> find_body_axis(const DenseLogits& logits, const AffineMap& 
       }
     }
   }
-  if (torso.count() < kMinTorsoCells) return std::nullopt;
+  if (torso.count() < std::max(double(kMinTorsoCells), kMinTorsoFraction * body_cells)) return std::nullopt;
   const Point slope = unit(torso.slope());
   Point sum{-slope.x, -slope.y};
   if (head.count() >= kMinHeadCells) {
@@ -131,16 +157,21 @@ bool leans(const std::optional<Point>& axis, double degrees, const Point& up) {
 }
 
 PersonCrop crop_around_person(int size, const AffineMap& cells_to_image, const std::optional<Point>& axis,
-                              float mask_threshold, double margin, int side_px, const DecodeMemory& memory) {
+                              float mask_threshold, double margin, int side_px, const DecodeMemory& memory,
+                              const OpenSides& without_margin) {
   PersonCrop crop;
   crop.is_rotated = leans(axis, kMinRotationDegrees);
   // The rotation about the image's origin that takes the axis to upright, (0, -1): x' = cos x - sin y.
   const double cos = crop.is_rotated ? -axis->y : 1, sin = crop.is_rotated ? -axis->x : 0;
   const AffineMap rotation{cos, -sin, 0, sin, cos, 0};
-  const Bounds bounds = bounds_of_person(size, cells_to_image.then(rotation), mask_threshold, memory);
+  Bounds bounds = bounds_of_person(size, cells_to_image.then(rotation), mask_threshold, memory);
+  const double room = margin * std::max(bounds.high.x - bounds.low.x, bounds.high.y - bounds.low.y);
+  if (!without_margin.left) bounds.low.x -= room;
+  if (!without_margin.top) bounds.low.y -= room;
+  if (!without_margin.right) bounds.high.x += room;
+  if (!without_margin.bottom) bounds.high.y += room;
   const Point middle{(bounds.low.x + bounds.high.x) / 2, (bounds.low.y + bounds.high.y) / 2};
-  const double room = 2 * margin * std::max(bounds.high.x - bounds.low.x, bounds.high.y - bounds.low.y);
-  const double width = bounds.high.x - bounds.low.x + room, height = bounds.high.y - bounds.low.y + room;
+  const double width = bounds.high.x - bounds.low.x, height = bounds.high.y - bounds.low.y;
   const double scale = side_px / (kContext * std::max({width, height, 1.0}));
   crop.to_crop.xx = crop.to_crop.yy = scale * cos;
   crop.to_crop.xy = -scale * sin;
@@ -152,6 +183,23 @@ PersonCrop crop_around_person(int size, const AffineMap& cells_to_image, const s
   crop.box = {float(half_side - half_width), float(half_side - half_height), float(half_side + half_width),
               float(half_side + half_height)};
   return crop;
+}
+
+Point steady_axis(const std::optional<Point>& axis, const PersonCrop& before) {
+  return leans(axis, kSteadyDegrees, before.up()) ? *axis : before.up();
+}
+
+PersonCrop steady_crop(const PersonCrop& wanted, const PersonCrop& before, double max_shift_px) {
+  const AffineMap between = wanted.to_image.then(before.to_crop);
+  const Box &box = wanted.box, &old_box = before.box;
+  double shift = 0;
+  for (const auto& [x, old_x] : {std::pair(box.x0, old_box.x0), std::pair(box.x1, old_box.x1)}) {
+    for (const auto& [y, old_y] : {std::pair(box.y0, old_box.y0), std::pair(box.y1, old_box.y1)}) {
+      const Point corner = between({double(x), double(y)});
+      shift = std::max({shift, std::abs(corner.x - double(old_x)), std::abs(corner.y - double(old_y))});
+    }
+  }
+  return shift < max_shift_px ? before : wanted;
 }
 
 Box person_bounds(int size, const AffineMap& cells_to_image, float mask_threshold, const DecodeMemory& memory) {

@@ -39,7 +39,7 @@ void SurfaceMapper::run(RunCancel& cancel) {
   shapes_.assign(2, {people, spec_.pool_size, spec_.pool_size, 4 * (spec_.coarse_classes + spec_.index_classes)});
   shapes_[1][3] = charts_.channels();
   const std::vector<TensorView>& answers = dense_head_->run(inputs_, shapes_, &cancel);
-  labels_ = answers[0].data;
+  labels_ = const_cast<float*>(answers[0].data);  // ours until the next run
   surface_ = answers[1].data;
 }
 

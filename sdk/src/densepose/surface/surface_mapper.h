@@ -16,7 +16,7 @@ namespace maq {
 
 // The output of the dense head for one person.
 struct SurfaceAnswer {
-  const float* labels = nullptr;   // nullptr: there is none yet
+  float* labels = nullptr;         // nullptr: there is none yet
   const float* surface = nullptr;  // features of U and V
 };
 
@@ -54,7 +54,8 @@ class SurfaceMapper {
   RoiAlign roi_align_;
   std::vector<float> rois_;
   size_t count_ = 0;
-  const float *labels_ = nullptr, *surface_ = nullptr;
+  float* labels_ = nullptr;
+  const float* surface_ = nullptr;
   std::vector<TensorView> inputs_;
   std::vector<Shape> shapes_;
 };

@@ -35,8 +35,19 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         }
     }
 
+    /** The use that the other defaults are for. */
+    enum class Preset(internal val code: Int) {
+        /** Frames of a camera or clip: fast. */
+        STREAM(MAQ_DENSEPOSE_PRESET_STREAM),
+
+        /** Single images: everybody is mapped again in a crop of 256 pixels, which takes two to three times as long. */
+        PHOTO(MAQ_DENSEPOSE_PRESET_PHOTO),
+    }
+
     /** Chooses the people whose surface is computed again from an upright crop of the frame in full resolution. */
     enum class PersonCrops(internal val code: Int) {
+        /** The preset's: off for streams, all for photos. */
+        DEFAULT(MAQ_DENSEPOSE_CROPS_DEFAULT),
         OFF(MAQ_DENSEPOSE_CROPS_OFF),
 
         /** Crops of people who are small in the networks' input, or lean. */
@@ -68,12 +79,14 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         val keyFrameInterval: Int = 0,
         val minPersonHeightPx: Int = 0,
         val detail: Detail = Detail.SURFACE,
-        val personCrops: PersonCrops = PersonCrops.OFF,
+        val personCrops: PersonCrops = PersonCrops.DEFAULT,
         val personCropPx: Int = 0,
         val provider: Provider = Provider.CPU,
+        val preset: Preset = Preset.STREAM,
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_densepose_config().also {
+                it.preset = preset.code
                 it.model.set(bundle, threads, provider)
                 it.long_side_px = longSidePx
                 it.score_threshold = scoreThreshold

@@ -193,11 +193,12 @@ internal object Native {
 }
 
 internal const val MAQ_CLOCK_MEDIA = 1; internal const val MAQ_CLOCK_MONOTONIC = 2
-internal const val MAQ_DENSEPOSE_CROPS_OFF = 0; internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
-internal const val MAQ_DENSEPOSE_CROPS_ALL = 2
+internal const val MAQ_DENSEPOSE_CROPS_DEFAULT = 0; internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
+internal const val MAQ_DENSEPOSE_CROPS_ALL = 2; internal const val MAQ_DENSEPOSE_CROPS_OFF = 3
 internal const val MAQ_DENSEPOSE_DETAIL_SURFACE = 0; internal const val MAQ_DENSEPOSE_DETAIL_PART = 1
 internal const val MAQ_DENSEPOSE_PLANE_PART = 1; internal const val MAQ_DENSEPOSE_PLANE_U = 2
 internal const val MAQ_DENSEPOSE_PLANE_V = 3; internal const val MAQ_DENSEPOSE_PLANE_PERSON = 4
+internal const val MAQ_DENSEPOSE_PRESET_STREAM = 0; internal const val MAQ_DENSEPOSE_PRESET_PHOTO = 1
 internal const val MAQ_EDGES_CONVEXITY_UNKNOWN = 0; internal const val MAQ_EDGES_CONVEXITY_CONVEX = 1
 internal const val MAQ_EDGES_CONVEXITY_CONCAVE = 2
 internal const val MAQ_EDGES_CURVE_LINE = 0; internal const val MAQ_EDGES_CURVE_ARC = 1
@@ -319,16 +320,17 @@ internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32
     val bundle_files get() = Pointer(this, 24)
 }
 
-internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(80, outer, at) {
-    val model = maq_model_options(this, 8); var long_side_px: Int get() = int(40); set(v) = int(40, v)
-    var score_threshold: Float get() = float(44); set(v) = float(44, v)
-    var max_people: Int get() = int(48); set(v) = int(48, v)
-    var max_proposals: Int get() = int(52); set(v) = int(52, v)
-    var key_frame_interval: Int get() = int(56); set(v) = int(56, v)
-    var min_person_height_px: Int get() = int(60); set(v) = int(60, v)
-    var detail: Int get() = int(64); set(v) = int(64, v); var person_crops: Int get() = int(68); set(v) = int(68, v)
-    var person_crop_px: Int get() = int(72); set(v) = int(72, v)
-    var result_pool_size: Int get() = int(76); set(v) = int(76, v)
+internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
+    val model = maq_model_options(this, 8); var preset: Int get() = int(40); set(v) = int(40, v)
+    var long_side_px: Int get() = int(44); set(v) = int(44, v)
+    var score_threshold: Float get() = float(48); set(v) = float(48, v)
+    var max_people: Int get() = int(52); set(v) = int(52, v)
+    var max_proposals: Int get() = int(56); set(v) = int(56, v)
+    var key_frame_interval: Int get() = int(60); set(v) = int(60, v)
+    var min_person_height_px: Int get() = int(64); set(v) = int(64, v)
+    var detail: Int get() = int(68); set(v) = int(68, v); var person_crops: Int get() = int(72); set(v) = int(72, v)
+    var person_crop_px: Int get() = int(76); set(v) = int(76, v)
+    var result_pool_size: Int get() = int(80); set(v) = int(80, v)
 }
 
 internal class maq_densepose_model_stats(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {

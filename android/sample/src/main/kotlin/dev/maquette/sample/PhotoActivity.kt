@@ -8,7 +8,7 @@ import dev.maquette.DensePose
 /** The people of a photo that the user picks. */
 open class PhotoActivity : PeopleScreen() {
     private val densePose by lazy {
-        val config = DensePose.Config(longSidePx = 384, personCrops = DensePose.PersonCrops.AUTO)
+        val config = DensePose.Config(preset = DensePose.Preset.PHOTO)
         maquette.densePose(networks("densepose-b-int8"), config)
     }
     private var photo: Bitmap? = null

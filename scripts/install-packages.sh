@@ -118,8 +118,9 @@ if wants lint; then
     needs_command clang-tidy clang-tidy
 fi
 if wants fuzz android; then
-    needs_command clang++-14 clang-14  # with libFuzzer
+    needs_command clang++-14 clang-14
 fi
+! wants fuzz || needs_package libclang-rt-14-dev  # libFuzzer and sanitizers
 if wants android; then
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Kotlin, and Android's classes to test against

@@ -34,7 +34,12 @@ trap 'WINEPREFIX="$work/wine" "$(dirname "$wine")/wineserver" -k || true; rm -rf
 export LC_ALL=C.UTF-8 WINEPREFIX="$work/wine" WINEDEBUG=-all
 "$wine" wineboot >/dev/null 2>&1  # makes its folders
 cc -O1 -shared -fPIC -o "$work/amx.so" scripts/windows/amx_permission.c
-windows() { LD_PRELOAD="$work/amx.so" "$wine" "$stage/maquette.exe" "$@" 2> >(grep -v DXGI >&2); }
+windows() {
+    local status=0
+    LD_PRELOAD="$work/amx.so" "$wine" "$stage/maquette.exe" "$@" 2>"$work/errors.log" || status=$?
+    grep -v DXGI "$work/errors.log" >&2 || true
+    return $status
+}
 mkdir "$work/linux" "$work/windows"
 
 # both ARGUMENT...: the command on both systems; OUT in an argument is the folder of each.

@@ -54,8 +54,8 @@ typedef struct maq_densepose_config {
   int32_t key_frame_interval;  /* 0 (default) and 1: every frame is a key frame, in which people are detected. N, up to
                                   1000: every N-th frame of a stream is one. In between, boxes are propagated and no new
                                   people are found; frames without people cost nothing. A frame of another size or of
-                                  another roll is a key frame. If each person has a crop (`person_crops`), only the crops
-                                  are computed in between. */
+                                  another roll is a key frame. If each person has a crop (`person_crops`), only the
+                                  crops are computed in between. */
   int32_t min_person_height_px;     /* people less tall than this in the frame may be missed, up to 100000; larger is
                                        faster; 0 (default): no limit */
   maq_densepose_detail detail;      /* default MAQ_DENSEPOSE_DETAIL_SURFACE */

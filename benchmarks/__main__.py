@@ -3,7 +3,7 @@
     python -m benchmarks                  all sections, 40 minutes; `make bench` builds first
     python -m benchmarks --quick          fewer rounds and images, as a smoke test
     python -m benchmarks --only runtimes  one section; the others are kept from the last run in --out
-    python -m benchmarks --publish        also copies the report to docs/benchmarks
+    python -m benchmarks --publish        also copies the report to docs/benchmarks; with --only alone, the last report
 
 Sections: frames (people, pixels, threads; start, memory), startup (libraries, their size, CPU time), sizes (the
 library without some systems), ui_latency (waits of an app with a window), sweep (error against run time), person_sizes
@@ -78,7 +78,7 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), metavar="SECTION")
+    parser.add_argument("--only", nargs="*", choices=SECTIONS, default=list(SECTIONS), metavar="SECTION")
     parser.add_argument("--publish", action="store_true")
     parser.add_argument("--no-guest", action="store_true", help="cameras: without the virtual machine")
     scenes.add_arguments(parser)

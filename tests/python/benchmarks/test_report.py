@@ -160,6 +160,20 @@ def test_sections_of_one_commit_are_published_without_the_html_page(tmp_path):
     assert "index.html" not in files
 
 
+def test_without_a_section_the_last_report_is_published_as_it_is(tmp_path, monkeypatch):
+    shown = ("machine", "threads", "metrics", "missing", "measured", "startup", "cameras")
+    found = {"schema": benchmark.SCHEMA, "quick": False, "metrics": {}, "missing": {}} | {
+        name: own for name, own in document().items() if name in shown
+    }
+    (tmp_path / "benchmark.json").write_text(json.dumps(found))
+    monkeypatch.setattr(benchmark.publish, "__defaults__", (tmp_path / "published",))
+    assert benchmark.main(["--out", str(tmp_path), "--publish", "--only"]) in (0, 1)
+    again = json.loads((tmp_path / "published" / "benchmark.json").read_text())
+    assert {name: again[name] for name in found} == found
+    assert "startup" in again
+    assert "frames" not in again
+
+
 def test_sections_of_different_commits_are_refused_with_the_command_that_helps(tmp_path):
     refusal, files = published(tmp_path, measured=stamps(cameras="fedcba987654", edges_of_times="fedcba987654"))
     assert files == set()

@@ -1,5 +1,9 @@
-// URIs of sources, and recordings.
+// URIs of sources, recordings, and the images that ffmpeg sends.
+#include <fcntl.h>
+
 #include "checked_file.h"
+#include "core/files/unique_fd.h"
+#include "image/clips/nut_stream.h"
 #include "sources/calibration_options.h"
 #include "sources/control_options.h"
 #include "sources/recording/recording.h"
@@ -122,4 +126,16 @@ SEEDED_FUZZ(recording, recording_seeds) {
       });
     }
   });
+}
+
+FUZZ(nut) {
+  const fuzz::MemoryFile file(bytes);
+  const UniqueFd opened(open(file.path().c_str(), O_RDONLY | O_CLOEXEC));
+  NutStream stream(opened.get());
+  if (!stream.is_open() || int64_t(stream.width_px()) * stream.height_px() > 1 << 18) return;
+  std::vector<uint8_t> pixels;
+  int64_t time_ns = 0;
+  for (int frames = 0; frames < 8 && stream.read(pixels, time_ns); ++frames) {
+    fuzz::require(pixels.size() == size_t(stream.width_px()) * size_t(stream.height_px()) * 3, "the size of an image");
+  }
 }

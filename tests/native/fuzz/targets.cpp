@@ -55,6 +55,7 @@ constexpr std::pair<const char*, const char*> kFiles[] = {
     {"embedding_file", "tiny_transformer/bundle/transformer.maqr"},
     {"embedding_file", "tiny_transformer/rows_in_bytes.maqr"},
     {"surface_files", "tiny_bundle/charts.f32"},
+    {"nut", "clips/test_pattern.nut"},
     {"ply", "tiny_scene/capture/cloud.ply"},
     {"ply", "curves/example.ply"},
     {"transforms", "tiny_scene/capture/transforms.json"},

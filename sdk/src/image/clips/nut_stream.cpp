@@ -186,13 +186,14 @@ void NutStream::read_stream_header(Packet& packet) {
   packet.number();  // class
   packet.text();    // kind of pixels, which is known
   packet.number();  // time base
-  pts_bits_ = packet.number();
+  const uint64_t pts_bits = packet.number();
   packet.number();  // largest step of time
   packet.number();  // delay
   packet.number();  // flags
   packet.text();
   const uint64_t width = packet.number(), height = packet.number();
-  if (width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX || width * height > MAQ_MAX_PIXELS || pts_bits_ > 15) return;
+  if (width > MAQ_MAX_SIDE_PX || height > MAQ_MAX_SIDE_PX || width * height > MAQ_MAX_PIXELS || pts_bits > 15) return;
+  pts_bits_ = pts_bits;
   width_px_ = int(width);
   height_px_ = int(height);
 }
@@ -262,7 +263,9 @@ bool NutStream::read(std::vector<uint8_t>& pixels, int64_t& time_ns) {
   if (begin.size() > size) return false;
   std::copy(begin.begin(), begin.end(), pixels.begin());
   if (!read_bytes(pixels.data() + begin.size(), pixels.size() - begin.size())) return false;
-  time_ns = std::llround(double(last_pts_) * double(time_numerator_) / double(time_denominator_) * 1e9);
+  const double time = double(last_pts_) * double(time_numerator_) / double(time_denominator_) * 1e9;
+  if (!(std::abs(time) < 9e18)) return false;  // no such number of nanoseconds
+  time_ns = std::llround(time);
   is_broken_ = false;
   return true;
 }

@@ -1,9 +1,8 @@
 """Compares the labels that `maquette densepose` gives on this processor with those on others, which qemu emulates.
 
 The same bundle and the same images, with the preset for streams, on x86-64 with AVX2 but without VNNI (whose 8-bit
-products saturate), and on
-aarch64 without and with the dot product and matrix instructions. Needs both builds and Debian's qemu-user;
-`make test-isa` makes them and runs this.
+products saturate), and on aarch64 without and with the dot product and matrix instructions. Needs both builds and
+Debian's qemu-user; `make test-isa` makes them and runs this.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ typedef struct maq_densepose_result maq_densepose_result;
 /* The use that the other defaults are for. */
 typedef enum maq_densepose_preset {
   MAQ_DENSEPOSE_PRESET_STREAM = 0, /* frames of a camera or clip: fast */
-  MAQ_DENSEPOSE_PRESET_PHOTO = 1 /* single images: everybody is mapped again in a crop of 256 pixels. Finds more people,
-                                    hands and feet; takes two to three times as long. */
+  MAQ_DENSEPOSE_PRESET_PHOTO = 1 /* single images: everybody is mapped again in a crop of 256 pixels. Parts and outlines
+                                    are better; takes two to three times as long. */
 } maq_densepose_preset;
 
 /* The labels that each pixel of a person gets. */

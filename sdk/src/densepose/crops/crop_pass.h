@@ -50,8 +50,8 @@ class CropPass {
   // Returns the score with the confidence of the answer.
   float score_of(const MappedPerson& person) const;
 
-  // Gives crops to the people who gain by one. `up`: in the image, a unit vector. `previous`: in a stream,
-  // the people of the previous frame, whose crops stay the same as far as possible; nullptr for a still image.
+  // Gives crops to the people who gain by one. `up`: in the image, a unit vector. `previous`: in a stream, the
+  // people of the previous frame, whose crops stay the same as far as possible; nullptr for a still image.
   void choose(std::vector<MappedPerson>& people, const Point& up, const std::vector<MappedPerson>* previous);
   // Runs trunk and dense head over the crops of `people`. A new answer replaces the first one unless it is clearly less
   // confident; then the person loses the crop. Returns the number of crops; `*provider` is set if there are any.

@@ -323,6 +323,13 @@ def _turn_onto(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def posed(body: Body, shape: Shape, pose: Pose, rng: np.random.Generator) -> np.ndarray:
     """Vertices [V, 3] of a body in a pose; hands, fingers and feet are drawn from `rng`."""
+    return body.skinned(shape, *posed_bones(body, shape, pose, rng))
+
+
+def posed_bones(
+    body: Body, shape: Shape, pose: Pose, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Rotations [B, 3, 3] and heads [B, 3] of the bones of a body in a pose, as `posed` skins it."""
     limb = dict(zip(LIMBS, pose.limbs, strict=True))
     given = {"root": pose.root, "head": pose.head}
     spine = Slerp([0, 1], Rotation.from_matrix([pose.root, pose.chest]))
@@ -360,4 +367,4 @@ def posed(body: Body, shape: Shape, pose: Pose, rng: np.random.Generator) -> np.
             if parent >= 0
             else shape.heads[k]
         )
-    return body.skinned(shape, rotations, heads)
+    return rotations, heads

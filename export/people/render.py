@@ -7,7 +7,7 @@ and averaged; labels are taken from one of the samples, since labels must not be
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("LP_NUM_THREADS", "1")  # the software rasteriser; processes are the parallelism here
 
@@ -119,15 +119,17 @@ class Light:
 
 @dataclass(frozen=True)
 class Person:
-    """vertices [V, 3] in world axes, metres, and what to draw on them; worn things that are not part of the mesh."""
+    """vertices [V, 3] in world axes, metres, and what to draw on them; worn things that are not part of the mesh.
+    cloth_seed: how fabrics lie, the same in every image; None: as the renderer's random numbers say."""
 
     vertices: np.ndarray
     layers: list[Layer]
     worn: tuple[Prop, ...] = ()
+    cloth_seed: int | None = None
 
     def moved(self, x: float, y: float) -> Person:
         """The same person elsewhere on the ground."""
-        return Person(self.vertices + [x, y, 0], self.layers, tuple(p.moved(x, y) for p in self.worn))
+        return replace(self, vertices=self.vertices + [x, y, 0], worn=tuple(p.moved(x, y) for p in self.worn))
 
 
 @dataclass(frozen=True)
@@ -260,8 +262,9 @@ class Renderer:
         for number, person in enumerate(people, 1):
             self._set("instance", float(number))
             near = max(float(np.quantile(seen[number - 1][::50, 2], 0.1)), 0.2)
+            cloth = rng if person.cloth_seed is None else np.random.default_rng(person.cloth_seed)
             for layer in reversed(person.layers):  # the outermost first: what it hides need not be shaded
-                self._layer(layer, self.moving[number - 1], SUPERSAMPLING * camera.fx_px / near, rng)
+                self._layer(layer, self.moving[number - 1], SUPERSAMPLING * camera.fx_px / near, cloth)
         for prop, buffer in things:
             self._prop(prop, buffer, 0)
         for prop, number, buffer in worn:

@@ -98,9 +98,9 @@ class Studio:
             light = panorama.light(stage.camera, yaw, exposure, rng)
         else:
             behind = self._background_behind(rng, stage.roll_degrees)
-            light = _light(rng, stage.camera, behind, stage.indoors)
+            light = photo_light(rng, stage.camera, behind, stage.indoors)
         picture = self.renderer.draw(stage.people, stage.camera, light, rng, stage.props)
-        image = _composed(rng, picture, behind)
+        image = composed(rng, picture, behind)
         label, point = picture.label, picture.point
         if rng.random() < 0.14:
             image, label = self._occluder(rng, image, label)
@@ -163,7 +163,7 @@ def _shrunk(photo: np.ndarray) -> np.ndarray:
     return cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
-def _light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors: bool) -> Light:
+def photo_light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors: bool) -> Light:
     """Sky, ground, a key light and a weaker one; most of the time with the photo's colours, brightness and bright side.
 
     photo: BGR float32 [H, W, 3].
@@ -200,7 +200,7 @@ def _light(rng: np.random.Generator, camera: Camera, photo: np.ndarray, indoors:
     )
 
 
-def _composed(rng: np.random.Generator, picture: Picture, behind: np.ndarray) -> np.ndarray:
+def composed(rng: np.random.Generator, picture: Picture, behind: np.ndarray) -> np.ndarray:
     """The image over the photo `behind`: BGR float32 [H, W, 3]."""
     alpha, colour = picture.alpha, picture.rgb[..., ::-1]
     if rng.random() < 0.5:

@@ -25,7 +25,9 @@ ALLOWED = {
     "export.checked_file": {"export.xxh3"},
     "export.onnx_graphs": {"export.bundle"},
     "export.photos": set(),
-    "export.people": {"export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid"},
+    "export.people": {
+        "export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid", "export.xxh3",
+    },
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
     "export.solids": {"export.camera", "export.jobs", "export.photos"},
     "export.clips": {"export.camera", "export.jobs", "export.people", "export.places"},
@@ -144,7 +146,8 @@ def test_the_table_of_packages_has_no_circle():
 READERS = (
     "export.prediction.train_autoencoder", "export.prediction.codes", "export.prediction.train_transformer",
     "export.densepose.train", "export.densepose.export_onnx", "export.scenes.train", "export.teachers.shards",
-    "export.evaluation.__main__", "export.evaluation.gallery", "export.heads.train_prior",
+    "export.evaluation.__main__", "export.evaluation.gallery", "export.people.clips.clip_file",
+    "export.heads.train_prior",
     "export.heads.encoder_training.train",
     "export.heads.export_onnx", "export.heads.bundle", "quantization.quantize", "quantization.choose",
     "quantization.report", "quantization.scenes", "quantization.heads",

@@ -1,0 +1,1 @@
+"""Clips of several people who move, with exact ids, labels and joints."""

@@ -29,7 +29,8 @@ build: packages-demo  ## configure and build the SDK and its command line (relea
 
 WHEELS ?= $(shell uname -m)
 .PHONY: wheel
-wheel: packages-wheel  ## Python packages for Linux with glibc 2.28 and newer: library, and networks of each system, into build/wheel
+wheel: packages-wheel  ## Python packages for Linux with glibc 2.28 and newer, into build/wheel; WHEELS="x86_64 aarch64" for both
+	@$(if $(filter aarch64,$(WHEELS)),scripts/install-packages.sh isa)
 	@scripts/make-venv.sh
 	@JOBS=$(JOBS) scripts/make-wheel.sh $(WHEELS)
 

@@ -11,7 +11,7 @@
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh wheel       to build the SDK, and: what builds codecs from source
 #   scripts/install-packages.sh windows     to build the SDK, and: a compiler for Windows, what builds codecs, Wine (1.2 GB)
-#   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian
+#   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian, and qemu for one of arm64
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
 #   scripts/install-packages.sh site        to build the site: Doxygen, Maven
 #   scripts/install-packages.sh test lint   what both need, at once
@@ -130,7 +130,10 @@ if wants android; then
     needs_command python3 python3
     needs_package python3-pip         # brings headers of a C library like Android's
 fi
-! wants newcomer || needs_command debootstrap debootstrap
+if wants newcomer; then
+    needs_command debootstrap debootstrap
+    needs_command qemu-aarch64-static qemu-user-static
+fi
 if wants site; then
     needs_command doxygen doxygen
     needs_command javac openjdk-17-jdk-headless

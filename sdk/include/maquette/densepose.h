@@ -47,7 +47,8 @@ typedef struct maq_densepose_config {
                                   value finds near people. If it shows small people or nobody, larger images are also
                                   searched at 480 pixels. In a stream (frames with a `sequence` above 0), earlier
                                   frames count, too. */
-  float score_threshold;       /* minimum score of a person, up to 1; 0 (default): the bundle's value */
+  float score_threshold;       /* minimum score of a person, up to 1; 0 (default): the bundle's value. People who were
+                                  in the previous frame of a stream stay down to 0.7 of it. */
   int32_t max_people;          /* 1 to 255, best scores first; 0 (default): the bundle's value */
   int32_t max_proposals;       /* boxes that reach the box head, 1 to 1000; 0 (default): the bundle's value. Fewer boxes
                                   are faster and may miss people in a crowd. */

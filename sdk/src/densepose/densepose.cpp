@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/rounding.h"
 #include "core/trace/trace_section.h"
+#include "densepose/detector/shown_people.h"
 #include "nn/provider.h"
 
 namespace maq {
@@ -174,7 +175,15 @@ void DensePose::map_image(const ImageView& image, DensePoseResult& result) {
 
 const std::vector<ScoredBox>& DensePose::run_detector(const ImageView& image, const std::vector<ScoredBox>* followed,
                                                       DensePoseStats& stats) {
-  return detector_->run(image, seen_, followed, crops_->min_box_score(settings_.score_threshold), *cancel_, stats);
+  const float threshold = settings_.score_threshold;
+  shown_boxes_.clear();
+  if (is_stream_) {
+    for (const MappedPerson& person : tracked_) shown_boxes_.push_back(person.box);
+  }
+  const float min_score = shown_boxes_.empty() ? threshold : kept_score(threshold);
+  found_ = detector_->run(image, seen_, followed, crops_->min_box_score(min_score), *cancel_, stats);
+  mark_shown(shown_boxes_, seen_.to_image, crops_->min_box_score(threshold), found_);
+  return found_;
 }
 
 void DensePose::follow_people(const ImageView& image, DensePoseStats& stats) {
@@ -290,7 +299,8 @@ void DensePose::map_people(const ImageView& image, DensePoseStats& stats) {
 
 void DensePose::drop_unlikely() {
   const auto is_unlikely = [&](const MappedPerson& person) {
-    return crops_->score_of(person) <= settings_.score_threshold;
+    const float threshold = settings_.score_threshold;
+    return crops_->score_of(person) <= (person.found.was_shown ? kept_score(threshold) : threshold);
   };
   mapped_.erase(std::remove_if(mapped_.begin(), mapped_.end(), is_unlikely), mapped_.end());
 }

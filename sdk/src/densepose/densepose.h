@@ -89,6 +89,7 @@ class DensePose {
   // Adds the people of the image to `mapped_` and their regions to `mapper_`: of a key frame, or by propagating boxes.
   void detect_people(const ImageView& image, DensePoseStats& stats);
   void follow_people(const ImageView& image, DensePoseStats& stats);
+  // In a stream, people who were shown in the previous frame need lower scores.
   const std::vector<ScoredBox>& run_detector(const ImageView& image, const std::vector<ScoredBox>* followed,
                                              DensePoseStats& stats);
   void add_people(const ImageView& image, const std::vector<ScoredBox>& found, const std::vector<uint8_t>* keeps);
@@ -124,7 +125,8 @@ class DensePose {
   // People of the previous frame, to be followed: by their boxes or, if all have crops, in the crops alone.
   std::vector<MappedPerson> tracked_;
   std::vector<ScoredBox> tracked_boxes_;
-  std::vector<ScoredBox> near_people_, all_people_;
+  std::vector<Box> shown_boxes_;
+  std::vector<ScoredBox> found_, near_people_, all_people_;
   std::vector<uint8_t> keeps_near_, keeps_far_;
   bool tracks_crops_ = false;
   int image_width_px_ = 0, image_height_px_ = 0;

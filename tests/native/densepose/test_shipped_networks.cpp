@@ -416,6 +416,37 @@ TEST_F(ShippedNetworks, InAStillStreamFewerLabelsChangeThanInSingleImagesWithCro
   EXPECT_LT(crops, 0.5 * single);
 }
 
+TEST_F(ShippedNetworks, APersonAtTheThresholdStaysInAStreamAndNobodyAppearsThere) {
+  // The photo, ever less of it, until the score is a little lower.
+  cv::Mat faint;
+  float score = 1;
+  for (double contrast = 0.9; score > 0.97f && contrast > 0.02; contrast *= 0.9) {
+    photo_.convertTo(faint, CV_8U, contrast, 127 * (1 - contrast));
+    maq::DensePoseResult result;
+    make().run(view_of(faint), result);
+    ASSERT_EQ(result.people.size(), 1u) << contrast;
+    score = result.people[0].score;
+  }
+  for (const int key_frame_interval : {1, 4}) {
+    maq::DensePoseSettings settings;
+    settings.score_threshold = score + 0.01f;
+    settings.key_frame_interval = key_frame_interval;
+    maq::DensePose densepose = make(settings);
+    const auto people = [&](const cv::Mat& image) {
+      maq::DensePoseResult result;
+      densepose.run(view_of(image), result, true);
+      return result.people.size();
+    };
+    EXPECT_EQ(people(faint), 0u) << "nobody was there";
+    densepose.reset();
+    EXPECT_EQ(people(photo_), 1u);
+    for (int frame = 0; frame < 5; ++frame) EXPECT_EQ(people(faint), 1u);
+    EXPECT_EQ(people(one_colour(photo_.cols, photo_.rows, cv::Scalar::all(90))), 0u) << "gone";
+    densepose.reset();
+    EXPECT_EQ(people(faint), 0u) << "another stream";
+  }
+}
+
 TEST_F(ShippedNetworks, FramesOfOneColourAndCheckerboardsShowNoPeople) {
   maq::DensePose densepose = make();
   maq::DensePoseResult result;

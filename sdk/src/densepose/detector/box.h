@@ -26,12 +26,15 @@ bool clip_box(Box& box, float width, float height);
 
 // Intersection over union; 0 for boxes without area.
 float overlap(const Box& a, const Box& b);
+// Two boxes of one person, from two inputs or two frames, overlap by more.
+constexpr float kSamePersonIou = 0.5f;
 
 // A candidate of NMS. `index` breaks ties: of equal scores the lowest comes first.
 struct ScoredBox {
   Box box;
   float score = 0;
   int64_t index = 0;
+  bool was_shown = false;  // in a stream: at the place of a person of the previous frame
 };
 
 // Best score first, then lowest index: the order of everything that follows.

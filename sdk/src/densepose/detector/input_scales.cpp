@@ -11,8 +11,6 @@ constexpr double kMinGrowth = 1.25;
 // Long sides of a person's box in the smaller input. Smaller people need the larger input; a stream leaves it when
 // nobody is smaller than the second value. People who are larger than the third are never taken from the larger input.
 constexpr float kSmallPx = 100, kNoLongerSmallPx = 110, kMaxFarPx = 160;
-// Boxes of one person in both inputs overlap by this IoU.
-constexpr float kSamePersonIou = 0.5f;
 // A box that lies in another one by this fraction of its area, and has a long side shorter by that factor, shows a
 // part of the other person.
 constexpr float kInside = 0.8f, kPartOfPerson = 0.5f;

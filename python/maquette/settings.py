@@ -79,7 +79,8 @@ class DensePoseSettings(ModelSettings, total=False):
     `sequence` above 0), earlier frames count, too."""
 
     score_threshold: float
-    """Minimum score of a person, up to 1; 0 (default): the bundle's value."""
+    """Minimum score of a person, up to 1; 0 (default): the bundle's value. People who were in the previous frame of a
+    stream stay down to 0.7 of it."""
 
     max_people: int
     """1 to 255, best scores first; 0 (default): the bundle's value."""

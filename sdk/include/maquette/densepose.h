@@ -69,7 +69,8 @@ typedef struct maq_densepose_person {
   uint32_t struct_size;
   float score;     /* 0 to 1 */
   float box_px[4]; /* in pixels of the frame: left, top, right, bottom; right and bottom are exclusive */
-  int64_t id;      /* for tracking; always MAQ_NO_ID in this version */
+  int64_t id;      /* in a stream, 1 or more: a person keeps it while seen, and mostly when back after being away. New
+                      people get new numbers. MAQ_NO_ID in single images (frames with `sequence` 0). */
 } maq_densepose_person;
 
 /* The planes of a result: one byte a pixel of the frame. */

@@ -69,7 +69,8 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       scales_(settings_.long_side_px),
       cancel_(std::make_unique<RunCancel>(runtime)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
-               bundle.path_of(spec_.surface_file)) {
+               bundle.path_of(spec_.surface_file)),
+      tracker_(size_t(settings_.max_people)) {
   SessionSettings on_provider;
   on_provider.threads = settings_.threads;
   on_provider.provider = available_provider(*runtime, settings_.provider);
@@ -88,20 +89,26 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   }
 }
 
-void DensePose::run(const ImageView& image, DensePoseResult& result, bool follows) {
-  is_stream_ = follows || settings_.key_frame_interval > 1;
+void DensePose::run(const ImageView& image, DensePoseResult& result, std::optional<int64_t> stream_time_ns) {
+  is_stream_ = stream_time_ns || settings_.key_frame_interval > 1;
+  time_ns_ = stream_time_ns;
   scales_.set_stream(is_stream_);
   try {
     map_image(image, result);
     cancel_->check();  // a later cancel() is for the next run
   } catch (...) {
     cancel_->reset();
-    reset();  // some of the frame's boxes may be missing
+    forget_frame();  // some of the frame's boxes may be missing
     throw;
   }
 }
 
 void DensePose::reset() {
+  forget_frame();
+  tracker_.begin_stream();
+}
+
+void DensePose::forget_frame() {
   frames_since_key_ = 0;
   tracked_.clear();
   tracks_crops_ = false;
@@ -110,7 +117,7 @@ void DensePose::reset() {
 }
 
 void DensePose::set_quality(int key_frame_interval, int long_side_px) {
-  if (long_side_px != settings_.long_side_px) reset();  // boxes are followed in pixels of the network's input
+  if (long_side_px != settings_.long_side_px) forget_frame();  // boxes are followed in pixels of the network's input
   settings_.key_frame_interval = key_frame_interval;
   settings_.long_side_px = long_side_px;
 }
@@ -170,6 +177,7 @@ void DensePose::map_image(const ImageView& image, DensePoseResult& result) {
     if (!mapped_.empty()) map_people(image, stats);
   }
   paint_people(result);
+  if (is_stream_) give_ids(image, result);
   stats.total_ms = float(total.lap_ms());
 }
 
@@ -352,10 +360,18 @@ void DensePose::paint_people(DensePoseResult& result) {
     if (is_stream_ && person.crop) {
       crops_->follow(person, !ran_crops_alone, result.planes.width_px, result.planes.height_px, decode_memory_);
     }
-    result.people.push_back({person.box, person.found.score});
+    result.people.push_back({person.box, person.found.score, MAQ_NO_ID});
     if (!(tracks_crops_ && is_lost)) tracked_.push_back(person);
   }
   result.stats.decode_ms = float(stage.lap_ms());
+}
+
+void DensePose::give_ids(const ImageView& image, DensePoseResult& result) {
+  const TraceSection trace("maquette ids");
+  painted_boxes_.clear();
+  for (const Person& person : result.people) painted_boxes_.push_back(person.box);
+  const std::vector<int64_t>& ids = tracker_.update(image, result.planes, painted_boxes_, time_ns_);
+  for (size_t i = 0; i < ids.size(); ++i) result.people[i].id = ids[i];
 }
 
 }  // namespace maq

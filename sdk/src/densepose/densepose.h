@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/frame.h"
@@ -16,6 +17,7 @@
 #include "densepose/surface/steady_labels.h"
 #include "densepose/surface/surface_grid.h"
 #include "densepose/surface/surface_mapper.h"
+#include "densepose/tracking/person_tracker.h"
 #include "nn/bundle.h"
 #include "nn/session.h"
 
@@ -24,6 +26,7 @@ namespace maq {
 struct Person {
   Box box;  // in pixels of the image
   float score = 0;
+  int64_t id = MAQ_NO_ID;  // in streams
 };
 
 struct DensePoseStats : DetectorStats {
@@ -56,14 +59,17 @@ class DensePose {
   DensePose& operator=(const DensePose&) = delete;
 
   // Reuses the memory of `result`. One thread at a time. With key_frame_interval above 1, images are frames of one
-  // stream: between key frames the boxes of the previous frame replace proposals. `follows`: the image is the next
-  // frame of a stream, so that an automatic size may depend on earlier frames. Throws MAQ_ERROR_INFERENCE,
-  // MAQ_CANCELLED.
-  void run(const ImageView& image, DensePoseResult& result, bool follows = false);
+  // stream: between key frames the boxes of the previous frame replace proposals. `stream_time_ns`: the image is the
+  // frame of a stream at that time, so that earlier frames count. Throws MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
+  void run(const ImageView& image, DensePoseResult& result, std::optional<int64_t> stream_time_ns = {});
   // From any thread: ends the current run, or the next one if none runs.
   void cancel() noexcept { cancel_->cancel(); }
   // The next image begins another stream.
   void reset();
+
+  // The ids of people that were given so far end here; those of another object may go on from it.
+  int64_t last_person_id() const { return tracker_.last_id(); }
+  void number_people_after(int64_t id) { tracker_.number_after(id); }
 
   // The values in use: with MAQ_THREADS_MEASURED, the number that was measured when this was made.
   int threads() const { return settings_.threads; }
@@ -82,6 +88,8 @@ class DensePose {
 
  private:
   void map_image(const ImageView& image, DensePoseResult& result);
+  // The next frame does not follow the previous one.
+  void forget_frame();
   // Decides whether the image is a key frame.
   void begin_frame(const ImageView& image, DensePoseStats& stats);
   // Prepares the image for the networks, at that long side.
@@ -103,6 +111,7 @@ class DensePose {
   void sort_by_score();  // `mapped_`, best first
   // Paints `mapped_`. Adds the people who got a pixel to `result`, and to `tracked_` for the next frame.
   void paint_people(DensePoseResult& result);
+  void give_ids(const ImageView& image, DensePoseResult& result);
 
   DensePoseSpec spec_;
   bool measures_threads_;
@@ -128,10 +137,13 @@ class DensePose {
   std::vector<Box> shown_boxes_;
   std::vector<ScoredBox> found_, near_people_, all_people_;
   std::vector<uint8_t> keeps_near_, keeps_far_;
+  PersonTracker tracker_;
+  std::vector<Box> painted_boxes_;
   bool tracks_crops_ = false;
   int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;
-  bool is_stream_ = false;  // the image follows the previous one
+  bool is_stream_ = false;          // the image follows the previous one
+  std::optional<int64_t> time_ns_;  // of the image
 };
 
 }  // namespace maq

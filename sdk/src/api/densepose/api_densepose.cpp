@@ -127,8 +127,9 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(frame, "frame");
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
-    const bool is_stream = frame->frame.sequence > 0;
-    densepose->densepose->run(frame->frame.image, handle->result, is_stream);
+    std::optional<int64_t> stream_time_ns;
+    if (frame->frame.sequence > 0) stream_time_ns = frame->frame.timestamp_ns;
+    densepose->densepose->run(frame->frame.image, handle->result, stream_time_ns);
     *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });
@@ -180,7 +181,7 @@ maq_status maq_densepose_result_get_person(const maq_densepose_result* result, u
     require_argument(result, "result");
     require_index("index", index, result->result.people.size());
     const Person& from = result->result.people[index];
-    const maq_densepose_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, MAQ_NO_ID};
+    const maq_densepose_person filled{0, from.score, {from.box.x0, from.box.y0, from.box.x1, from.box.y1}, from.id};
     write_struct(person, "person", filled);
     return MAQ_OK;
   });

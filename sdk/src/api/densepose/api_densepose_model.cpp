@@ -35,6 +35,7 @@ class DensePoseModel : public LiveModel {
     state_->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " (",
                         bundle.manifest.precision, ") loaded, ", loaded->threads(), " thread(s)");
     full_ = {loaded->key_frame_interval(), loaded->long_side_px()};
+    loaded->number_people_after(last_person_id_);
     std::lock_guard<std::mutex> lock(mutex_);
     densepose_ = std::move(loaded);
     quality_ = full_;
@@ -45,13 +46,14 @@ class DensePoseModel : public LiveModel {
     budget_.reset();
     std::lock_guard<std::mutex> lock(mutex_);
     densepose_.swap(unloaded);
+    if (unloaded != nullptr) last_person_id_ = unloaded->last_person_id();
     quality_ = {0, 0};
   }
 
   void run(const Frame& frame, const maq_intrinsics*, std::unique_ptr<LiveOutput>& output) override {
     const auto begin = MonotonicClock::now();
     densepose_->set_roll(roll_rad_);
-    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result, true);
+    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result, frame.timestamp_ns);
     keep_budget(begin);
   }
 
@@ -123,6 +125,7 @@ class DensePoseModel : public LiveModel {
   std::optional<SurfaceGrid> surface_;
 
   // The pipeline's thread alone uses these.
+  int64_t last_person_id_ = 0;
   DensePoseQuality full_;
   std::optional<FrameBudget> budget_;
   double known_budget_ms_ = 0;

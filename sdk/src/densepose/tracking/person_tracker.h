@@ -1,0 +1,71 @@
+// Numbers for the people of a stream that stay the same while a person is seen, and when the person comes back.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/frame.h"
+#include "densepose/detector/box.h"
+#include "densepose/surface/dense_decode.h"
+#include "densepose/tracking/assignment.h"
+#include "densepose/tracking/surface_colours.h"
+
+namespace maq {
+
+// A person is recognised by place and motion while seen and for a second after, with the colours of the body surface
+// beside them; later by the colours alone. An id is given once: people of a later stream get others.
+class PersonTracker {
+ public:
+  // `max_people`: of a frame.
+  explicit PersonTracker(size_t max_people);
+
+  // Gives ids, 1 or more, to the people of the next frame. `boxes`: in pixels of the image, in the order of `planes`.
+  // `time_ns`: of the frame; without it, a thirtieth of a second has passed. Where time goes back, or stands still for
+  // more than a frame, motion tells nothing. The ids are valid until the next call.
+  const std::vector<int64_t>& update(const ImageView& image, const DensePlanes& planes, const std::vector<Box>& boxes,
+                                     std::optional<int64_t> time_ns);
+
+  // The next frame begins another stream: nobody is recognised.
+  void begin_stream();
+
+  // The largest id that was given, 0 for none.
+  int64_t last_id() const { return last_id_; }
+  // New people get ids above `id`.
+  void number_after(int64_t id) { last_id_ = id; }
+
+ private:
+  struct Track {
+    int64_t id = 0;
+    Box box;
+    float velocity_x = 0, velocity_y = 0;  // of the box's centre, pixels a second
+    int64_t seen_ns = 0;
+    bool has_place = true;  // of this run of frames, so that place and motion count
+    SurfaceColours colours;
+  };
+
+  void move_time(const ImageView& image, std::optional<int64_t> time_ns);
+  void recognise_by_place(const std::vector<Box>& boxes);
+  void recognise_by_colours(const std::vector<Box>& boxes);
+  // Whether a person could have come there from the track's last place.
+  bool is_reachable(const Track& track, const Box& box) const;
+  void take_over(Track& track, size_t person, const std::vector<Box>& boxes);
+  void start(size_t person, const Box& box);
+  void forget_oldest();
+
+  size_t max_tracks_;
+  int64_t last_id_ = 0;
+  int64_t now_ns_ = 0;
+  bool is_begun_ = false;
+  int width_px_ = 0, height_px_ = 0;
+  std::vector<Track> tracks_;
+  // Scratch of a frame.
+  Assignment assignment_;
+  std::vector<float> costs_;
+  std::vector<SurfaceColours> colours_;
+  std::vector<int> track_of_;   // of each person of the frame; -1: not known yet
+  std::vector<char> is_taken_;  // of each track
+  std::vector<int64_t> ids_;
+};
+
+}  // namespace maq

@@ -1,0 +1,40 @@
+// What people look like: mean colours of places on the body surface, as far as these were seen.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "core/frame.h"
+#include "densepose/surface/dense_decode.h"
+
+namespace maq {
+
+// Colours are Y, Cb and Cr (BT.601), 0 to 255.
+struct SurfaceColours {
+  struct Place {
+    std::array<float, 3> colour{};  // mean
+    float samples = 0;              // how many pixels it is the mean of, at most kMaxSamples
+  };
+  static constexpr int kParts = 24, kPlacesOfPart = 4;  // halves in U by halves in V
+  // Older pixels count less once this many were seen.
+  static constexpr float kMaxSamples = 400;
+
+  std::array<Place, size_t(kParts* kPlacesOfPart)> places;
+
+  // Adds what another frame shows of the same person.
+  void add(const SurfaceColours& seen);
+};
+
+// 0: the same colours on all places that both show; 1: as different as clothes can be. `shared`: how much of the body
+// both show, 0 to 1; at 0 nothing can be said.
+struct LookDifference {
+  float distance = 0;
+  float shared = 0;
+};
+LookDifference difference(const SurfaceColours& a, const SurfaceColours& b);
+
+// Reads the colours of `people` people, counted from 1 in `planes`, at a grid of pixels. `image` has the planes' size.
+void read_colours(const ImageView& image, const DensePlanes& planes, size_t people,
+                  std::vector<SurfaceColours>& colours);
+
+}  // namespace maq

@@ -23,13 +23,13 @@ PART_COUNT = 24
 @dataclass(frozen=True)
 class Person:
     """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1. head_box_px:
-    around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does. id: the same number for one
-    person in several frames; None in this version, which does not track people."""
+    around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does. id: from 1; in a
+    stream (frames of a `Source`) the same for one person in all frames, mostly also after being away."""
 
     box_px: tuple[float, float, float, float]
     score: float
     head_box_px: tuple[float, float, float, float] | None
-    id: int | None = None
+    id: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +154,7 @@ def densepose_result(result: Any, lent: LentResult) -> DensePoseResult:
     shape = size[1][0], size[0][0]
     count = n.lib.maq_densepose_result_get_person_count(result)
     found = n.indexed("maq_densepose_result_get_person", result, "maq_densepose_person", count)
-    people = [
-        Person(tuple(p.box_px), p.score, _head_box_px(result, index), None if p.id == n.lib.MAQ_NO_ID else p.id)
-        for index, p in enumerate(found)
-    ]
+    people = [Person(tuple(p.box_px), p.score, _head_box_px(result, index), p.id) for index, p in enumerate(found)]
     part, u, v, person = (
         n.plane("maq_densepose_result_get_plane", result, plane, shape, np.uint8)
         for plane in (

@@ -112,7 +112,8 @@ class Frame(NativeObject):
     `Frame(pixels)` wraps an array without a copy: uint8 [H, W, 3] (RGB unless `format` says otherwise), [H, W, 4]
     (RGBA) or [H, W] (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Images of Pillow,
     tensors on the CPU, and other objects that numpy reads work, too. Don't write to the array while a model reads it.
-    intrinsics: of the camera, for the array's size; edges need them. Frames of a `Source` have the time, the number
+    intrinsics: of the camera, for the array's size; edges need them. sequence: from 0 for the frames of a stream, whose
+    earlier frames then count (ids of people, steady labels). Frames of a `Source` have the time, the number
     and, if they are known, the intrinsics of the camera. Raises ValueError for an array that is no such image.
     """
 
@@ -122,6 +123,7 @@ class Frame(NativeObject):
         format: PixelFormat | str | None = None,
         timestamp_ns: int = 0,
         intrinsics: Intrinsics | None = None,
+        sequence: int = 0,
     ) -> None:
         array = _array_of(pixels)
         format = _format_of(array, pixels) if format is None else _pixel_format(format)
@@ -134,7 +136,7 @@ class Frame(NativeObject):
         self._pixels: np.ndarray | None = np.ascontiguousarray(array)
         description = n.sized("maq_frame_desc")
         n.call("maq_frame_desc_init", description, description.struct_size)
-        description.format, description.timestamp_ns = int(format), timestamp_ns
+        description.format, description.timestamp_ns, description.sequence = int(format), timestamp_ns, sequence
         description.height_px, description.width_px = array.shape[:2]
         if intrinsics is not None:
             if not isinstance(intrinsics, Intrinsics):

@@ -27,13 +27,13 @@ def log_frame(path: str, frame: Frame) -> None:
 
 
 def log_people(path: str, frame: Frame, result: DensePoseResult) -> None:
-    """The image, the body parts in their colours, and the boxes with their scores."""
+    """The image, the body parts in their colours, and the boxes with ids and scores."""
     log_frame(path, frame)
     parts = [(part, part_name(part), colour.tolist()) for part, colour in enumerate(part_colours())]
     rerun.log(path, rerun.AnnotationContext(parts), static=True)
     rerun.log(f"{path}/parts", rerun.SegmentationImage(result.part, opacity=0.6))
     boxes = np.array([person.box_px for person in result.people], np.float32).reshape(-1, 4)
-    labels = [f"{person.score:.2f}" for person in result.people]
+    labels = [f"#{person.id} {person.score:.2f}" for person in result.people]
     rerun.log(f"{path}/people", rerun.Boxes2D(array=boxes, array_format=rerun.Box2DFormat.XYXY, labels=labels))
 
 

@@ -51,9 +51,6 @@ typedef enum maq_status {
   MAQ_CANCELLED = 19              /* not an error: the app cancelled the call */
 } maq_status;
 
-/* The id of a person who is not tracked. */
-#define MAQ_NO_ID (-1)
-
 /* For maq_model_options.threads: the number of threads is measured when the networks are created. One network runs on
  * zeros with 1, 2, ... threads, up to the default number. The smallest number within 5 % of the fastest time is kept,
  * because more threads would only cost energy. This takes up to half a second, more for large networks. */

@@ -89,9 +89,9 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   }
 }
 
-void DensePose::run(const ImageView& image, DensePoseResult& result, std::optional<int64_t> stream_time_ns) {
-  is_stream_ = stream_time_ns || settings_.key_frame_interval > 1;
-  time_ns_ = stream_time_ns;
+void DensePose::run(const ImageView& image, DensePoseResult& result, const StreamPlace& place) {
+  is_stream_ = place.follows || settings_.key_frame_interval > 1;
+  place_ = place;
   scales_.set_stream(is_stream_);
   try {
     map_image(image, result);
@@ -177,7 +177,7 @@ void DensePose::map_image(const ImageView& image, DensePoseResult& result) {
     if (!mapped_.empty()) map_people(image, stats);
   }
   paint_people(result);
-  if (is_stream_) give_ids(image, result);
+  give_ids(image, result);
   stats.total_ms = float(total.lap_ms());
 }
 
@@ -360,7 +360,7 @@ void DensePose::paint_people(DensePoseResult& result) {
     if (is_stream_ && person.crop) {
       crops_->follow(person, !ran_crops_alone, result.planes.width_px, result.planes.height_px, decode_memory_);
     }
-    result.people.push_back({person.box, person.found.score, MAQ_NO_ID});
+    result.people.push_back({person.box, person.found.score, 0});
     if (!(tracks_crops_ && is_lost)) tracked_.push_back(person);
   }
   result.stats.decode_ms = float(stage.lap_ms());
@@ -368,9 +368,10 @@ void DensePose::paint_people(DensePoseResult& result) {
 
 void DensePose::give_ids(const ImageView& image, DensePoseResult& result) {
   const TraceSection trace("maquette ids");
+  if (!is_stream_) tracker_.begin_stream();
   painted_boxes_.clear();
   for (const Person& person : result.people) painted_boxes_.push_back(person.box);
-  const std::vector<int64_t>& ids = tracker_.update(image, result.planes, painted_boxes_, time_ns_);
+  const std::vector<int64_t>& ids = tracker_.update(image, result.planes, painted_boxes_, place_.time_ns);
   for (size_t i = 0; i < ids.size(); ++i) result.people[i].id = ids[i];
 }
 

@@ -26,7 +26,7 @@ namespace maq {
 struct Person {
   Box box;  // in pixels of the image
   float score = 0;
-  int64_t id = MAQ_NO_ID;  // in streams
+  int64_t id = 0;  // from 1, see maq_densepose_person
 };
 
 struct DensePoseStats : DetectorStats {
@@ -49,6 +49,12 @@ struct DensePoseResult {
   DensePoseStats stats;
 };
 
+// An image's place in a stream.
+struct StreamPlace {
+  bool follows = false;            // the previous image is the frame before; otherwise a stream may begin
+  std::optional<int64_t> time_ns;  // without it, frames are a thirtieth of a second apart
+};
+
 class DensePose {
  public:
   // Opens the networks of `bundle`, which is not needed afterwards. Throws MAQ_ERROR_BAD_BUNDLE, and
@@ -59,17 +65,17 @@ class DensePose {
   DensePose& operator=(const DensePose&) = delete;
 
   // Reuses the memory of `result`. One thread at a time. With key_frame_interval above 1, images are frames of one
-  // stream: between key frames the boxes of the previous frame replace proposals. `stream_time_ns`: the image is the
-  // frame of a stream at that time, so that earlier frames count. Throws MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
-  void run(const ImageView& image, DensePoseResult& result, std::optional<int64_t> stream_time_ns = {});
+  // stream: between key frames the boxes of the previous frame replace proposals. Earlier frames count if the image
+  // follows them. Throws MAQ_ERROR_INFERENCE, MAQ_CANCELLED.
+  void run(const ImageView& image, DensePoseResult& result, const StreamPlace& place = {});
   // From any thread: ends the current run, or the next one if none runs.
   void cancel() noexcept { cancel_->cancel(); }
   // The next image begins another stream.
   void reset();
 
-  // The ids of people that were given so far end here; those of another object may go on from it.
+  // The largest id of a person of the stream; another object can go on with the stream above it.
   int64_t last_person_id() const { return tracker_.last_id(); }
-  void number_people_after(int64_t id) { tracker_.number_after(id); }
+  void number_people_after(int64_t id) { tracker_.begin_stream(id); }
 
   // The values in use: with MAQ_THREADS_MEASURED, the number that was measured when this was made.
   int threads() const { return settings_.threads; }
@@ -142,8 +148,8 @@ class DensePose {
   bool tracks_crops_ = false;
   int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;
-  bool is_stream_ = false;          // the image follows the previous one
-  std::optional<int64_t> time_ns_;  // of the image
+  bool is_stream_ = false;  // the image follows the previous one
+  StreamPlace place_;
 };
 
 }  // namespace maq

@@ -22,7 +22,7 @@ std::string json_of(const DensePoseResult& result) {
     for (const float edge : {person.box.x0, person.box.y0, person.box.x1, person.box.y1}) {
       json.value(rounded(double(edge), 100));
     }
-    json.end_list().member("score", rounded(double(person.score), 10000)).end_object();
+    json.end_list().member("score", rounded(double(person.score), 10000)).member("id", person.id).end_object();
   }
   return json.end_list().end_object().text() + "\n";
 }

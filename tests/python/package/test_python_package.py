@@ -69,7 +69,7 @@ def test_results_are_drawn_and_saved_as_the_command_line_does(person, tmp_path):
     assert np.array_equal(stored, result.iuv)
     assert (tmp_path / "person_INDS.png").exists()
     assert str(result) == "<DensePoseResult 320 x 240, 1 person>"
-    assert result.people[0].id is None
+    assert result.people[0].id == 1
 
     body = result.part > 0
     over, alone = result.draw(person, opacity=255), result.draw(opacity=100)

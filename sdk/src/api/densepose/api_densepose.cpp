@@ -127,9 +127,8 @@ maq_status maq_densepose_run(maq_densepose* densepose, const maq_frame* frame, m
     require_argument(frame, "frame");
     require_argument(result, "result");
     BoundedPool<maq_densepose_result>::Pooled handle = densepose->results.acquire();
-    std::optional<int64_t> stream_time_ns;
-    if (frame->frame.sequence > 0) stream_time_ns = frame->frame.timestamp_ns;
-    densepose->densepose->run(frame->frame.image, handle->result, stream_time_ns);
+    const StreamPlace place{frame->frame.sequence > 0, frame->frame.timestamp_ns};
+    densepose->densepose->run(frame->frame.image, handle->result, place);
     *result = lend<maq_densepose_result>(std::move(handle));
     return MAQ_OK;
   });

@@ -53,7 +53,7 @@ class DensePoseModel : public LiveModel {
   void run(const Frame& frame, const maq_intrinsics*, std::unique_ptr<LiveOutput>& output) override {
     const auto begin = MonotonicClock::now();
     densepose_->set_roll(roll_rad_);
-    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result, frame.timestamp_ns);
+    densepose_->run(frame.image, reuse_output<DensePoseOutput>(output).handle.result, {true, frame.timestamp_ns});
     keep_budget(begin);
   }
 

@@ -18,6 +18,7 @@ class JsonText {
   JsonText& key(const char* name);
   JsonText& value(double number);  // the shortest text that is read as the same number
   JsonText& value(int number) { return add(std::to_string(number)); }
+  JsonText& value(int64_t number) { return add(std::to_string(number)); }
   JsonText& value(bool flag) { return add(flag ? "true" : "false"); }
   JsonText& value(const char* text) { return value(std::string(text)); }
   JsonText& value(const std::string& text);  // bytes that are not UTF-8 are replaced

@@ -6,9 +6,9 @@
 namespace maq {
 namespace {
 
-constexpr int64_t kSecond_ns = 1'000'000'000, kFrame_ns = kSecond_ns / 30;
+constexpr uint64_t kSecond_ns = 1'000'000'000, kFrame_ns = kSecond_ns / 30;
 // A longer pause of the stream tells nothing about where people are.
-constexpr int64_t kLongestPause_ns = 2 * kSecond_ns;
+constexpr uint64_t kLongestPause_ns = 2 * kSecond_ns;
 // People who were not seen for longer are recognised by their colours alone.
 constexpr double kPlaceKnown_s = 1.0;
 // Motion is believed for so long.
@@ -29,7 +29,8 @@ constexpr float kEnoughShared = 0.3f, kSameColours = 0.17f, kClearlyNearer = 0.0
 // Boxes that overlap by more: the colours of one person may be on the other.
 constexpr float kMixed = 0.4f;
 
-double seconds(int64_t time_ns) { return double(time_ns) / double(kSecond_ns); }
+// Later than `before_ns` by this time; times may be any numbers.
+uint64_t between(int64_t before_ns, int64_t after_ns) { return uint64_t(after_ns) - uint64_t(before_ns); }
 float centre_x(const Box& box) { return (box.x0 + box.x1) / 2; }
 float centre_y(const Box& box) { return (box.y0 + box.y1) / 2; }
 float size_of(const Box& box) { return std::max(box.width(), box.height()); }
@@ -51,8 +52,9 @@ PersonTracker::PersonTracker(size_t max_people) : max_tracks_(max_people + kMaxA
   tracks_.reserve(max_tracks_ + max_people);
 }
 
-void PersonTracker::begin_stream() {
+void PersonTracker::begin_stream(int64_t last_id) {
   tracks_.clear();
+  last_id_ = last_id;
   is_begun_ = false;
 }
 
@@ -77,9 +79,13 @@ const std::vector<int64_t>& PersonTracker::update(const ImageView& image, const 
   return ids_;
 }
 
+double PersonTracker::seconds_since(const Track& track) const {
+  return double(between(track.seen_ns, now_ns_)) / double(kSecond_ns);
+}
+
 void PersonTracker::move_time(const ImageView& image, std::optional<int64_t> time_ns) {
-  const int64_t now_ns = time_ns.value_or(is_begun_ ? now_ns_ + kFrame_ns : 0);
-  const bool goes_on = is_begun_ && now_ns >= now_ns_ && now_ns - now_ns_ <= kLongestPause_ns &&
+  const int64_t now_ns = time_ns.value_or(is_begun_ ? int64_t(uint64_t(now_ns_) + kFrame_ns) : 0);
+  const bool goes_on = is_begun_ && now_ns >= now_ns_ && between(now_ns_, now_ns) <= kLongestPause_ns &&
                        image.width_px == width_px_ && image.height_px == height_px_;
   if (!goes_on) {
     for (Track& track : tracks_) track.has_place = false;
@@ -95,7 +101,7 @@ void PersonTracker::recognise_by_place(const std::vector<Box>& boxes) {
   for (size_t k = 0; k < tracks_.size(); ++k) {
     const Track& track = tracks_[k];
     if (!track.has_place) continue;
-    const double since_s = seconds(now_ns_ - track.seen_ns);
+    const double since_s = seconds_since(track);
     if (since_s > kPlaceKnown_s) continue;
     const float ahead_s = float(std::min(since_s, kMotionKnown_s));
     const Box expected = moved(track.box, track.velocity_x * ahead_s, track.velocity_y * ahead_s);
@@ -116,7 +122,7 @@ void PersonTracker::recognise_by_place(const std::vector<Box>& boxes) {
 }
 
 bool PersonTracker::is_reachable(const Track& track, const Box& box) const {
-  const double since_s = seconds(now_ns_ - track.seen_ns);
+  const double since_s = seconds_since(track);
   if (!track.has_place || since_s > kPlaceKnown_s) return true;
   const float distance = std::hypot(centre_x(track.box) - centre_x(box), centre_y(track.box) - centre_y(box));
   return distance < (kNear + kFastest * float(since_s)) * std::max(size_of(track.box), size_of(box));
@@ -161,7 +167,7 @@ void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
 
 void PersonTracker::take_over(Track& track, size_t person, const std::vector<Box>& boxes) {
   const Box& box = boxes[person];
-  const double since_s = seconds(now_ns_ - track.seen_ns);
+  const double since_s = seconds_since(track);
   if (!track.has_place || since_s > kPlaceKnown_s) {
     track.velocity_x = track.velocity_y = 0;
   } else if (since_s > 0) {

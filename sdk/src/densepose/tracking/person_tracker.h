@@ -26,13 +26,11 @@ class PersonTracker {
   const std::vector<int64_t>& update(const ImageView& image, const DensePlanes& planes, const std::vector<Box>& boxes,
                                      std::optional<int64_t> time_ns);
 
-  // The next frame begins another stream: nobody is recognised.
-  void begin_stream();
+  // The next frame begins another stream: nobody is recognised, and new people get ids above `last_id`.
+  void begin_stream(int64_t last_id = 0);
 
   // The largest id that was given, 0 for none.
   int64_t last_id() const { return last_id_; }
-  // New people get ids above `id`.
-  void number_after(int64_t id) { last_id_ = id; }
 
  private:
   struct Track {
@@ -44,6 +42,8 @@ class PersonTracker {
     SurfaceColours colours;
   };
 
+  // Since a track of this run of frames was seen.
+  double seconds_since(const Track& track) const;
   void move_time(const ImageView& image, std::optional<int64_t> time_ns);
   void recognise_by_place(const std::vector<Box>& boxes);
   void recognise_by_colours(const std::vector<Box>& boxes);

@@ -148,8 +148,19 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
     }
 }
 
-/** Edges in pixels of the frame, the right and the bottom one exclusive; score 0 to 1. */
-data class Person(val left: Float, val top: Float, val right: Float, val bottom: Float, val score: Float)
+/**
+ * Edges in pixels of the frame, the right and the bottom one exclusive; score 0 to 1.
+ *
+ * @property id from 1; in a stream the same for one person in all frames, mostly also after being away.
+ */
+data class Person(
+    val left: Float,
+    val top: Float,
+    val right: Float,
+    val bottom: Float,
+    val score: Float,
+    val id: Long,
+)
 
 /** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
 class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Unit = Native::maq_densepose_result_release) :
@@ -210,7 +221,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
                         Native.maq_densepose_result_get_person(it, index, person)
                     }
                 val (left, top, right, bottom) = person.box_px
-                Person(left, top, right, bottom, person.score)
+                Person(left, top, right, bottom, person.score, person.id)
             }
     }
 

@@ -1,4 +1,4 @@
-// What people look like, by places on the body surface.
+// Colours of people by places on the body surface.
 #include "densepose/tracking/surface_colours.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// What people look like: mean colours of places on the body surface, as far as these were seen.
+// Mean colours of places on the body surface, as far as they were seen: how a person looks.
 #pragma once
 
 #include <array>

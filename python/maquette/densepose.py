@@ -24,7 +24,7 @@ PART_COUNT = 24
 class Person:
     """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1. head_box_px:
     around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does. id: from 1; in a
-    stream (frames of a `Source`) the same for one person in all frames, mostly also after being away."""
+    stream (frames of a `Source`) the same for one person while seen."""
 
     box_px: tuple[float, float, float, float]
     score: float

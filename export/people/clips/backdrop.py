@@ -1,4 +1,4 @@
-"""What is behind the people of a clip, the light from it, and the response of the camera, the same in all frames."""
+"""The place behind the people of a clip, the light from it, and the response of the camera, the same in all frames."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Backdrop:
     exposure: float = 1.0
 
     def behind(self, camera: Camera) -> np.ndarray:
-        """What the camera sees behind the people: float32 [H, W, 3] BGR."""
+        """The camera's view behind the people: float32 [H, W, 3] BGR."""
         if self.panorama is not None:
             return self.panorama.seen(camera, self.yaw, self.exposure)
         if self.photo is None:

@@ -96,7 +96,7 @@ class Actor:
         return ((p - from_there) @ turn.T + shift for p in (vertices, joints))
 
     def seat(self, rng: np.random.Generator) -> tuple[list[Prop], np.ndarray | None]:
-        """What this person sits on in the clip, and its place [2]; none for who does not sit."""
+        """The seat of this person in the clip, and its place [2]; none for people who do not sit."""
         if self.role.kind != "sit" or self.track.bends.max() < 0.99:
             return [], None
         model = self.studio.model

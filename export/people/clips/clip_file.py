@@ -25,7 +25,7 @@ class ClipError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is known of T frames with P people. Person p has id p + 1 in every frame and in the label images.
+    """Truth of T frames with P people. Person p has id p + 1 in every frame and in the label images.
 
     time_ns [T]. visible_box, full_box [T, P, 4]: left, top, right, bottom in pixels, the latter two exclusive; of the
     visible pixels (NaN: none), and of the whole body, which may reach out of the image (NaN: behind the camera).

@@ -69,8 +69,8 @@ typedef struct maq_densepose_person {
   uint32_t struct_size;
   float score;     /* 0 to 1 */
   float box_px[4]; /* in pixels of the frame: left, top, right, bottom; right and bottom are exclusive */
-  int64_t id;      /* 1 or more. In a stream, a person keeps the id while seen, and mostly when back after being away;
-                      new people get new ids. A frame with `sequence` 0 begins a stream. */
+  int64_t id;      /* 1 or more. In a stream, a person keeps the id while seen and for a second after; new people get
+                      new ids. A frame with `sequence` 0 begins a stream. */
 } maq_densepose_person;
 
 /* The planes of a result: one byte a pixel of the frame. */

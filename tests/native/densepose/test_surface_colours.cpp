@@ -28,7 +28,7 @@ TEST(SurfaceColours, AreTheSameInAllPixelFormats) {
   for (const maq::SurfaceColours& other :
        {colours(MAQ_PIXEL_BGR8, {43, 86, 183}, {}), colours(MAQ_PIXEL_RGBA8, {183, 86, 43, 9}, {}),
         colours(MAQ_PIXEL_NV12, {110}, {90, 180}), colours(MAQ_PIXEL_YUYV, {110, 90, 110, 180}, {})}) {
-    const maq::LookDifference look = maq::difference(rgb, other);
+    const maq::ColourDifference look = maq::difference(rgb, other);
     EXPECT_LT(look.distance, 0.03f);
     EXPECT_GT(look.shared, 0.2f);
   }

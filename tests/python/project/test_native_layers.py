@@ -20,7 +20,7 @@ CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/assembly", "scene/render"}
-DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/surface"}
+DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/surface", "densepose/tracking"}
 CURVES = {"edges", "edges/curves"}
 HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/registration"}
 SYSTEMS = (
@@ -49,7 +49,8 @@ MAY_INCLUDE = {
     "densepose/bundle": BASE,
     "densepose/detector": BASE | {"core/trace", "densepose/bundle"},
     "densepose/surface": BASE | {"densepose/bundle", "densepose/detector"},
-    "densepose/crops": BASE | DENSEPOSE - {"densepose/crops"},
+    "densepose/tracking": BASE | {"densepose/detector", "densepose/surface"},
+    "densepose/crops": BASE | DENSEPOSE - {"densepose/crops", "densepose/tracking"},
     "edges": BASE,
     "edges/curves": BASE - {"nn"} | {"edges"},
     "edges/files": BASE - {"nn"} | CURVES,

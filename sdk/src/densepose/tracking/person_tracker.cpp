@@ -20,7 +20,7 @@ constexpr float kNewMotion = 0.4f;
 // People who left and may come back.
 constexpr size_t kMaxAway = 32;
 // A person's box overlaps the expected one by this IoU, or its centre is nearer than this part of the box's size.
-constexpr float kLeastIou = 0.1f, kNear = 0.5f;
+constexpr float kMinIou = 0.1f, kNear = 0.5f;
 // How much the colours count beside the place, where both show the same parts of the body; and the difference from
 // which on it is somebody else.
 constexpr float kColourWeight = 1.5f, kOtherPerson = 0.5f;
@@ -42,7 +42,7 @@ std::optional<float> place_cost(const Box& expected, const Box& box) {
   const float iou = overlap(expected, box);
   const float size = (size_of(expected) + size_of(box)) / 2;
   const float distance = std::hypot(centre_x(expected) - centre_x(box), centre_y(expected) - centre_y(box));
-  if (!(iou > kLeastIou) && !(distance < kNear * size)) return std::nullopt;
+  if (!(iou > kMinIou) && !(distance < kNear * size)) return std::nullopt;
   return 1 - iou;
 }
 
@@ -108,7 +108,7 @@ void PersonTracker::recognise_by_place(const std::vector<Box>& boxes) {
     for (size_t i = 0; i < boxes.size(); ++i) {
       const std::optional<float> place = place_cost(expected, boxes[i]);
       if (!place) continue;
-      const LookDifference look = difference(track.colours, colours_[i]);
+      const ColourDifference look = difference(track.colours, colours_[i]);
       if (look.shared > kEnoughShared && look.distance > kOtherPerson) continue;
       costs_[k * boxes.size() + i] = *place + kColourWeight * look.shared * look.distance;
     }
@@ -131,7 +131,7 @@ bool PersonTracker::is_reachable(const Track& track, const Box& box) const {
 void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
   const auto difference_to = [&](size_t person, size_t track) {
     if (!is_reachable(tracks_[track], boxes[person])) return 1.0f;
-    const LookDifference look = difference(tracks_[track].colours, colours_[person]);
+    const ColourDifference look = difference(tracks_[track].colours, colours_[person]);
     return look.shared > kEnoughShared ? look.distance : 1.0f;
   };
   // The person and the track that are nearest to each other, again and again.

@@ -110,7 +110,7 @@ void SurfaceColours::add(const SurfaceColours& seen) {
   }
 }
 
-LookDifference difference(const SurfaceColours& a, const SurfaceColours& b) {
+ColourDifference difference(const SurfaceColours& a, const SurfaceColours& b) {
   const std::array<Place, kRegions> of_a = regions_of(a), of_b = regions_of(b);
   Mean coarse, fine;
   float all = 0;

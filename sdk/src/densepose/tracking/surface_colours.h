@@ -27,11 +27,11 @@ struct SurfaceColours {
 
 // 0: the same colours on all places that both show; 1: as different as clothes can be. `shared`: how much of the body
 // both show, 0 to 1; at 0 nothing can be said.
-struct LookDifference {
+struct ColourDifference {
   float distance = 0;
   float shared = 0;
 };
-LookDifference difference(const SurfaceColours& a, const SurfaceColours& b);
+ColourDifference difference(const SurfaceColours& a, const SurfaceColours& b);
 
 // Reads the colours of `people` people, counted from 1 in `planes`, at a grid of pixels. `image` has the planes' size.
 void read_colours(const ImageView& image, const DensePlanes& planes, size_t people,

@@ -151,7 +151,7 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
 /**
  * Edges in pixels of the frame, the right and the bottom one exclusive; score 0 to 1.
  *
- * @property id from 1; in a stream the same for one person in all frames, mostly also after being away.
+ * @property id from 1; in a stream the same for one person while seen.
  */
 data class Person(
     val left: Float,

@@ -192,7 +192,7 @@ TEST_F(ApiSaving, AResultIsThreeFilesInTheDensePoseConvention) {
   result.save(folder_.file("a 50"));
   EXPECT_EQ(files_in(folder_.path()), 3u);
   EXPECT_EQ(read_text(folder_.file("a 50.json")),
-            "{\"width\":320,\"height\":256,\"people\":[{\"box\":[67.2,84.0,99.2,116.0],\"score\":0.9526}]}\n");
+            "{\"width\":320,\"height\":256,\"people\":[{\"box\":[67.2,84.0,99.2,116.0],\"score\":0.9526,\"id\":1}]}\n");
   const std::vector<uint8_t> iuv = read_rgb(context_, folder_.file("a 50_IUV.png"));
   const std::vector<uint8_t> inds = read_rgb(context_, folder_.file("a 50_INDS.png"));
   EXPECT_EQ(colour_type(folder_.file("a 50_INDS.png")), 0);

@@ -28,11 +28,12 @@ TEST(Trace, EachStageOfAFrameIsASection) {
   fake_trace_record(true);
   fake_trace_sections();
   run_frames(context, MAQ_DENSEPOSE_CROPS_OFF, 1);
-  const std::string one = std::string(kFrame) + "maquette decode\n";
+  const std::string one = std::string(kFrame) + "maquette decode\nmaquette ids\n";
   EXPECT_EQ(fake_trace_sections(), one + one);
   run_frames(context, MAQ_DENSEPOSE_CROPS_ALL, 2);
   EXPECT_EQ(fake_trace_sections(),
-            std::string(kFrame) + "maquette crops\nmaquette decode\nmaquette crops\nmaquette decode\n");
+            std::string(kFrame) +
+                "maquette crops\nmaquette decode\nmaquette ids\nmaquette crops\nmaquette decode\nmaquette ids\n");
   fake_trace_record(false);
 }
 
@@ -51,7 +52,7 @@ TEST(Trace, APipelineAlsoWaitsForFrames) {
     while (pipeline.next()) {
     }
   }
-  const std::string one = std::string("maquette acquire\n") + kFrame + "maquette decode\n";
+  const std::string one = std::string("maquette acquire\n") + kFrame + "maquette decode\nmaquette ids\n";
   EXPECT_EQ(fake_trace_sections(), one + "maquette acquire\n");
   fake_trace_record(false);
 }

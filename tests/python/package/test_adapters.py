@@ -72,7 +72,7 @@ def test_people_are_detections_of_supervision(result, frame):
     assert len(found) == len(result.people) == 2
     assert found.confidence == pytest.approx([person.score for person in result.people])
     assert np.array_equal(found.mask[1], result.person == 2)
-    assert found.tracker_id is None
+    assert found.tracker_id.tolist() == [person.id for person in result.people]
     painted = supervision.MaskAnnotator().annotate(frame.pixels(), found)
     assert np.array_equal((painted != frame.pixels()).any(-1), result.person > 0)
     assert len(found[found.confidence > 2]) == 0

@@ -13,7 +13,7 @@ from benchmarks.people_over_time.trackers import NO_ID
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """Of one frame. boxes [N, 4], scores [N], ids [N]: from 1, NO_ID where the library gave none."""
+    """One frame: boxes [N, 4], scores [N], ids [N]: from 1, NO_ID where the library gave none."""
 
     time_ns: int
     boxes: np.ndarray

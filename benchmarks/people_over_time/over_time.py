@@ -17,7 +17,7 @@ from export.people.clips.clip_file import Truth
 from export.shards import MIN_PIXELS, MIN_SIDE_PX
 
 AWAY_S = 2.0
-_MIN_SHARE = 0.08  # visible pixels as a part of the box of the whole body: about a fifth of the person
+_MIN_FRACTION = 0.08  # visible pixels as a part of the box of the whole body: about a fifth of the person
 
 
 def counted(truth: Truth) -> np.ndarray:
@@ -25,7 +25,7 @@ def counted(truth: Truth) -> np.ndarray:
     visible, full = truth.visible_box, truth.full_box
     side = np.nan_to_num(visible[..., 2:] - visible[..., :2]).max(-1)
     whole = np.nan_to_num((full[..., 2:] - full[..., :2]).prod(-1))
-    return (truth.visible_px >= np.maximum(MIN_PIXELS, _MIN_SHARE * whole)) & (side >= MIN_SIDE_PX)
+    return (truth.visible_px >= np.maximum(MIN_PIXELS, _MIN_FRACTION * whole)) & (side >= MIN_SIDE_PX)
 
 
 def frames_of(truth: Truth, found: Sequence[Detections], ids: Sequence[np.ndarray]) -> list[Frame]:
@@ -81,7 +81,7 @@ def returns(truth: Truth, frames: Sequence[Frame]) -> list[Return]:
 
     def mainly(person: int, first: int, last: int) -> int | None:
         seen = Counter(track for t, track in own[person].items() if first <= t <= last)
-        return seen.most_common(1)[0][0] if seen else None
+        return max(seen, key=seen.get) if seen else None
 
     found = []
     for person in range(truth.people):

@@ -21,7 +21,7 @@ from tqdm import tqdm
 from benchmarks.people_over_time import detections
 from benchmarks.people_over_time.detections import Detections
 from benchmarks.people_over_time.over_time import rated
-from benchmarks.people_over_time.trackers import NO_ID, TRACKERS
+from benchmarks.people_over_time.trackers import TRACKERS
 from export.people.clips.clip_file import ClipError, Truth, clip_paths, read_clip
 
 _PERCENT = ("HOTA", "DetA", "AssA", "IDF1", "MOTA", "recall", "precision")
@@ -42,13 +42,12 @@ def ids_of(name: str, found: Sequence[Detections]) -> list[np.ndarray]:
 
 
 def measured(truths: dict[str, Truth], found: dict[str, list[Detections]]) -> dict[str, dict[str, float]]:
-    """Scores by method. The library is left out where it gives no ids. Raises ValueError for a clip that is missing."""
+    """Scores by method. Raises ValueError for a clip that is missing."""
     missing = sorted(truths.keys() - found.keys())
     if missing:
         raise ValueError(f"There are no detections of {', '.join(missing)}.")
     clips = [(truth, found[name]) for name, truth in truths.items()]
-    has_ids = any((one.ids != NO_ID).any() for _, frames in clips for one in frames)
-    rows = {"library": rated(clips, library_ids)} if has_ids else {}
+    rows = {"library": rated(clips, library_ids)}
     return rows | {name: rated(clips, lambda own, name=name: ids_of(name, own)) for name in TRACKERS}
 
 
@@ -72,8 +71,6 @@ def show(console: Console, title: str, rows: dict[str, dict[str, float]]) -> Non
             f"{row['count_changes_per_min']:.0f} ({row['true_count_changes_per_min']:.0f})",
         )  # fmt: skip
     console.print(table)
-    if "library" not in rows:
-        console.print("The library gave no ids: only the baselines are measured.")
 
 
 def main() -> int:

@@ -8,12 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.people_over_time.trackers import NO_ID
-
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """One frame: boxes [N, 4], scores [N], ids [N]: from 1, NO_ID where the library gave none."""
+    """One frame: boxes [N, 4], scores [N], ids [N]: from 1."""
 
     time_ns: int
     boxes: np.ndarray
@@ -30,7 +28,7 @@ def detect(recording: Path, **settings: object) -> list[Detections]:
         for frame in source:
             people = dense.run(frame).people
             boxes = np.array([p.box_px for p in people], float).reshape(-1, 4)
-            ids = np.array([NO_ID if p.id is None else p.id for p in people], int)
+            ids = np.array([p.id for p in people], int)
             found.append(Detections(frame.timestamp_ns, boxes, np.array([p.score for p in people], float), ids))
     return found
 

@@ -80,7 +80,8 @@ def identity(frames: Sequence[Frame]) -> dict[str, float]:
 
 
 def matches(frames: Sequence[Frame]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Rows and columns that belong together in each frame, by IoU; those of the frame before are kept if they can."""
+    """Rows and columns that belong together in each frame, by IoU. A pair of the frame before stays together if its IoU
+    is still high enough."""
     before: dict[int, int] = {}
     found = []
     for f in frames:

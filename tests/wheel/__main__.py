@@ -93,13 +93,10 @@ def expected_files(machine: str, out: Path) -> None:
         name = next(name for name in archive.namelist() if "/binaries/ffmpeg" in name)
         ffmpeg.write_bytes(archive.read(name))
     ffmpeg.chmod(0o755)
-    maquette, start = ROOT / "build/release/stage/bin/maquette", "exec"
+    build, emulator = "release", ""
     if machine == "aarch64":
-        maquette, start = (
-            ROOT / "build/aarch64/stage/bin/maquette",
-            f"exec qemu-aarch64 -L {ROOT}/.deps/aarch64-sysroot",
-        )
-    (programs / "maquette").write_text(f'#!/bin/sh\n{start} "{maquette}" "$@"\n')
+        build, emulator = "aarch64", f'qemu-aarch64 -L "{ROOT}/.deps/aarch64-sysroot"'
+    (programs / "maquette").write_text(f'#!/bin/sh\nexec {emulator} "{ROOT}/build/{build}/stage/bin/maquette" "$@"\n')
     (programs / "maquette").chmod(0o755)
     environment = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT / "python"),
                                 "MAQ_FFMPEG": str(ffmpeg)}  # fmt: skip
@@ -122,6 +119,8 @@ def made_files(system: str, work: Path) -> float:
         shutil.copy(HERE / script, work)
     (folder / "test").mkdir(exist_ok=True)
     mounts = f'mount --bind "{work}" "{folder}/test" && mount -t proc proc "{folder}/proc"'
+    # ONNX Runtime learns from /sys what an aarch64 processor can do, and takes other kernels without it.
+    mounts += f' && mount --bind /sys "{folder}/sys"'
     enter = f'{mounts} && exec chroot "{folder}" sh -c "$1"'
     begin = time.monotonic()
     run("unshare", "--mount", "--net", "--pid", "--fork", "sh", "-c", enter, "sh", INSTALL,

@@ -208,14 +208,12 @@ def test_low_scores_continue_tracks_of_bytetrack_and_begin_none():
     assert Sort().update(box, np.array([0.3]), 0.1).tolist() == [1]
 
 
-def test_the_library_is_left_out_where_it_gives_no_ids():
+def test_the_library_is_rated_beside_the_baselines():
     boxes = [[box_at(100), box_at(300)]] * 10
     truths = {"a": truth_of(boxes)}
-    rows = measured(truths, {"a": found_of(boxes)})
-    assert list(rows) == ["SORT", "ByteTrack"]
-    assert rows["SORT"]["HOTA"] == pytest.approx(1)
     rows = measured(truths, {"a": found_of(boxes, [1, 2])})
     assert list(rows) == ["library", "SORT", "ByteTrack"]
+    assert rows["SORT"]["HOTA"] == pytest.approx(1)
     assert rows["library"]["IDF1"] == pytest.approx(1)
     with pytest.raises(ValueError, match="no detections of a"):
         measured(truths, {"b": found_of(boxes)})

@@ -129,11 +129,15 @@ bool PersonTracker::is_reachable(const Track& track, const Box& box) const {
 }
 
 void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
-  const auto difference_to = [&](size_t person, size_t track) {
-    if (!is_reachable(tracks_[track], boxes[person])) return 1.0f;
-    const ColourDifference look = difference(tracks_[track].colours, colours_[person]);
-    return look.shared > kEnoughShared ? look.distance : 1.0f;
-  };
+  costs_.assign(tracks_.size() * boxes.size(), 1);
+  for (size_t k = 0; k < tracks_.size(); ++k) {
+    if (is_taken_[k] != 0) continue;
+    for (size_t i = 0; i < boxes.size(); ++i) {
+      if (track_of_[i] >= 0 || !is_reachable(tracks_[k], boxes[i])) continue;
+      const ColourDifference look = difference(tracks_[k].colours, colours_[i]);
+      if (look.shared > kEnoughShared) costs_[k * boxes.size() + i] = look.distance;
+    }
+  }
   // The person and the track that are nearest to each other, again and again.
   while (true) {
     float best = kSameColours;
@@ -144,7 +148,7 @@ void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
       int nearest_track = -1;
       for (size_t k = 0; k < tracks_.size(); ++k) {
         if (is_taken_[k] != 0) continue;
-        const float distance = difference_to(i, k);
+        const float distance = costs_[k * boxes.size() + i];
         if (distance < nearest) {
           second = nearest;
           nearest = distance;

@@ -1,4 +1,4 @@
-// Numbers for the people of a stream that stay the same while a person is seen, and when the person comes back.
+// Ids of the people of a stream: each person keeps one while seen, and gets it again when recognised later.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@
 namespace maq {
 
 // A person is recognised by place and motion while seen and for a second after, with the colours of the body surface
-// beside them; later by the colours alone. An id is given once: people of a later stream get others.
+// beside them; later by the colours alone. No two people of a stream get one id at the same time.
 class PersonTracker {
  public:
   // `max_people`: of a frame.
   explicit PersonTracker(size_t max_people);
 
   // Gives ids, 1 or more, to the people of the next frame. `boxes`: in pixels of the image, in the order of `planes`.
-  // `time_ns`: of the frame; without it, a thirtieth of a second has passed. Where time goes back, or stands still for
-  // more than a frame, motion tells nothing. The ids are valid until the next call.
+  // `time_ns`: of the frame; without it, a thirtieth of a second has passed. Where time goes back or jumps by more
+  // than two seconds, only colours tell who is who. The ids are valid until the next call.
   const std::vector<int64_t>& update(const ImageView& image, const DensePlanes& planes, const std::vector<Box>& boxes,
                                      std::optional<int64_t> time_ns);
 

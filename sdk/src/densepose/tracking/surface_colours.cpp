@@ -143,7 +143,15 @@ void read_colours(const ImageView& image, const DensePlanes& planes, size_t peop
       if (person == 0 || person > people || part == 0 || part > size_t(SurfaceColours::kParts)) continue;
       const size_t place = size_t(SurfaceColours::kPlacesOfPart) * (part - 1) + size_t(planes.u[pixel] / 128) * 2 +
                            size_t(planes.v[pixel] / 128);
-      add_to(colours[person - 1].places[place], {colour_at(image, x, y), 1});
+      Place& sum = colours[person - 1].places[place];
+      const std::array<float, 3> colour = colour_at(image, x, y);
+      for (size_t c = 0; c < 3; ++c) sum.colour[c] += colour[c];
+      ++sum.samples;
+    }
+  }
+  for (SurfaceColours& one : colours) {
+    for (Place& place : one.places) {
+      for (float& mean : place.colour) mean /= std::max(1.0f, place.samples);
     }
   }
 }

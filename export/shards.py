@@ -93,15 +93,21 @@ class ShardWriter:
     def __init__(self, boxes: bool) -> None:
         self._files: dict[str, list[bytes]] = {"image": [], "label": [], "point": []}
         self._boxes: list[tuple[np.ndarray, ...]] | None = [] if boxes else None
+        self._keypoints: list[tuple[np.ndarray, ...]] = []
 
     def add(
         self, image: np.ndarray, label: np.ndarray, jpeg_quality: int,
-        point: np.ndarray | None = None, axis: np.ndarray | None = None,
+        point: np.ndarray | None = None, axis: np.ndarray | None = None, keypoint: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """image: uint8 [H, W, 3] BGR; label: uint8 [H, W, 4]; point: float [H, W, 3] of people's pixels, metres.
 
         axis: float [people, 2], the body axis of instance k in row k - 1 (`LabelledImage.axis`).
+        keypoint: float [people, 33, 3], the same of `Record.keypoint`.
         """
+        if keypoint is not None:
+            known = np.flatnonzero(np.isfinite(keypoint).all((1, 2)))
+            image_number = np.full(len(known), len(self._files["image"]), np.int32)
+            self._keypoints.append((keypoint[known].astype(np.float32), image_number, (known + 1).astype(np.uint8)))
         self._files["image"].append(_encoded(".jpg", image, cv2.IMWRITE_JPEG_QUALITY, jpeg_quality))
         self._files["label"].append(_encoded(".png", label, cv2.IMWRITE_PNG_COMPRESSION, 3))
         if point is not None:
@@ -120,6 +126,9 @@ class ShardWriter:
         if self._boxes is not None:
             columns = map(np.concatenate, zip(*self._boxes, strict=True))
             arrays |= dict(zip(_BOX_COLUMNS, columns, strict=True))
+        if self._keypoints:
+            columns = map(np.concatenate, zip(*self._keypoints, strict=True))
+            arrays |= dict(zip(_KEYPOINT_COLUMNS, columns, strict=True))
         arrays["meta"] = np.array(json.dumps(meta))
         for name, files in self._files.items():
             if files:
@@ -153,12 +162,15 @@ def shard_paths(folder: Path) -> list[Path]:
 class Record:
     """One image with its label, both still encoded (40 kB, at 640 x 512 140 kB), so that a whole set stays in memory.
 
-    axis: float32 [people, 2] by instance number - 1 (`LabelledImage.axis`); None where nobody knows any.
+    By instance number - 1, None where nobody knows any: axis: float32 [people, 2] (`LabelledImage.axis`); keypoint:
+    float32 [people, 33, 3] (`export.keypoints`), x and y in pixels and the probability that the image shows it; NaN for
+    people of whom nobody knows them.
     """
 
     image: bytes
     label: bytes
     axis: np.ndarray | None = None
+    keypoint: np.ndarray | None = None
 
     def decoded(self) -> tuple[np.ndarray, np.ndarray]:
         """BGR uint8 [H, W, 3] and label uint8 [H, W, 4]."""
@@ -173,21 +185,24 @@ def load_records(folder: Path, limit: int | None = None) -> list[Record]:
     """All images of a split, or the first `limit`. Raises ShardError."""
     records: list[Record] = []
     for path in tqdm(shard_paths(folder), desc=f"reading {folder.name}", unit="shard", leave=False):
-        shard = _read(path, "image", "label", optional=_BOX_COLUMNS)
+        shard = _read(path, "image", "label", optional=(*_BOX_COLUMNS, *_KEYPOINT_COLUMNS))
         for k in range(len(shard["image_end"])):
-            axis = _axis_by_instance(shard, k) if "box_axis" in shard else None
-            records.append(Record(_file(shard, "image", k).tobytes(), _file(shard, "label", k).tobytes(), axis))
+            axis = _by_instance(shard, k, "box_axis", "box") if "box_axis" in shard else None
+            keypoint = _by_instance(shard, k, "keypoint", "keypoint") if "keypoint" in shard else None
+            image, label = (_file(shard, kind, k).tobytes() for kind in ("image", "label"))
+            records.append(Record(image, label, axis, keypoint))
         if limit and len(records) >= limit:
             return records[:limit]
     return records
 
 
-def _axis_by_instance(shard: dict[str, np.ndarray], k: int) -> np.ndarray:
-    own = shard["box_image"] == k
-    number = shard["box_instance"][own].astype(int)
-    axis = np.full((number.max(initial=0), 2), np.nan, np.float32)
-    axis[number - 1] = shard["box_axis"][own]
-    return axis
+def _by_instance(shard: dict[str, np.ndarray], k: int, column: str, kind: str) -> np.ndarray:
+    """Rows of a column that belong to image k, by instance number - 1; NaN for others. kind: "box" or "keypoint"."""
+    own = shard[f"{kind}_image"] == k
+    number, values = shard[f"{kind}_instance"][own].astype(int), shard[column][own]
+    out = np.full((number.max(initial=0), *values.shape[1:]), np.nan, np.float32)
+    out[number - 1] = values
+    return out
 
 
 @dataclass(frozen=True)
@@ -246,6 +261,7 @@ def read_image(folder: Path, name: str) -> LabelledImage:
 
 _ENCODED = ("image", "label", "point")
 _BOX_COLUMNS = ("box", "box_image", "box_instance", "box_ignore", "box_axis")
+_KEYPOINT_COLUMNS = ("keypoint", "keypoint_image", "keypoint_instance")
 _WITH_TRUTH = ("image", "label", "point", "point_range", *_BOX_COLUMNS)
 _OPTIONAL = {"point", "point_end", "point_range", "box_axis"}
 

@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 @dataclass(frozen=True)
 class NetworkConfig:
     """Sizes of the network. `width`: channels of neck, RPN, box head and dense head (64 = variant B); `axis`: whether
-    the box head also tells the direction of the body axis; `evidence`: channels of `PersonEvidence`, 0 without it."""
+    the box head also tells the direction of the body axis; `evidence`: channels of `PersonEvidence`, `keypoints`: how
+    many of them the dense head tells; both 0 without."""
 
     BACKBONES: ClassVar[dict[str, tuple[int, ...]]] = {  # and their channels at strides 4, 8, 16, 32
         "mobilenet_v2": (24, 32, 96, 160),
@@ -20,6 +21,7 @@ class NetworkConfig:
     backbone: str = "mobilenet_v2"
     axis: bool = False
     evidence: int = 0
+    keypoints: int = 0
     tap_strides: tuple[int, ...] = (4, 8, 16, 32)
     rpn_strides: tuple[int, ...] = (4, 8, 16, 32, 64)
     anchor_sizes: tuple[int, ...] = (32, 64, 128, 256, 512)
@@ -45,6 +47,7 @@ class NetworkConfig:
             backbone=saved.get("backbone", "mobilenet_v3_large"),
             axis=saved.get("axis", False),
             evidence=saved.get("evidence", 0),
+            keypoints=saved.get("keypoints", 0),
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 import torch
 
+from export import keypoints
 from export.densepose.person_crop import (
     PersonCrop,
     crop_around,
@@ -49,8 +51,8 @@ class Cropping:
 
     def draw(self, record: Record, size: int, rng: np.random.Generator) -> list[tuple[np.ndarray, Truth]]:
         """One crop and its people."""
-        image, label, axis = augmented(record, size, rng, self)
-        return [(image, truth_of(label, axis))]
+        image, label, axis, keypoint = augmented(record, size, rng, self)
+        return [(image, truth_of(label, axis, keypoint))]
 
     def draw_roll(self, rng: np.random.Generator) -> float:
         _, low, high = self.rolls[rng.choice(len(self.rolls), p=[fraction for fraction, _, _ in self.rolls])]
@@ -90,7 +92,8 @@ class PersonCropping:
             known = None if record.axis is None else record.axis[instance[person] - 1]
             turn = self._turn(known, rng)
             crop = crop_around(self._shaken(turned_box(outline(own) + [x0, y0], turn), rng), turn, size)
-            drawn.append(self._crop(image, label, crop, int(instance[person]), rng))
+            number = int(instance[person])
+            drawn.append(self._crop(image, label, crop, number, rng, _rows_of([number], record.keypoint, _NO_KEYPOINT)))
         return drawn
 
     def _turn(self, axis: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
@@ -111,12 +114,15 @@ class PersonCropping:
         wide = side * np.array([1, 1]) * rng.uniform(0.4, 1, 2)
         corner = rng.uniform(0, np.array(label.shape[1::-1]) - wide)
         crop = crop_around(np.concatenate([corner, corner + wide]), rotation(0), size)
-        return self._crop(image, label, crop, BOX_ALONE - 1, rng)
+        return self._crop(image, label, crop, BOX_ALONE - 1, rng, _NO_KEYPOINT[None])
 
     def _crop(
-        self, image: np.ndarray, label: np.ndarray, crop: PersonCrop, number: int, rng: np.random.Generator
-    ) -> tuple[np.ndarray, Truth]:
+        self, image: np.ndarray, label: np.ndarray, crop: PersonCrop, number: int, rng: np.random.Generator,
+        keypoint: np.ndarray,
+    ) -> tuple[np.ndarray, Truth]:  # fmt: skip
+        """keypoint: [1, 33, 3] in the image."""
         image, label, box = cut(image, crop, _FILL), cut_label(label, crop), crop.box
+        keypoint = keypoints.mapped(keypoint, crop.into)
         if rng.random() < self.coarse:
             side = round(np.exp(rng.uniform(*np.log(self.coarse_px))))
             small = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
@@ -125,9 +131,11 @@ class PersonCropping:
             image, label = np.ascontiguousarray(image[:, ::-1]), label[:, ::-1].copy()
             label[..., :3] = mirror_iuv(label[..., :3])
             box = np.array([crop.side_px - box[2], box[1], crop.side_px - box[0], box[3]])
+            keypoint = keypoints.mirrored(keypoint, crop.side_px)
         truth = Truth(
             torch.from_numpy(box[None].astype(np.float32)), torch.tensor([number], dtype=torch.uint8),
             torch.zeros(1, dtype=torch.bool), torch.from_numpy(label), torch.full((1, 2), torch.nan),
+            torch.from_numpy(keypoint.astype(np.float32)),
         )  # fmt: skip
         return recoloured(image, rng), truth
 
@@ -146,20 +154,22 @@ PERSON_CROPPING = PersonCropping()
 SCALES = (0.06, 2.0)  # of the stored image
 MIN_AXIS = 0.15  # length below which the body axis points at the camera (`export.shards.LabelledImage.axis`)
 _FILL = tuple(float(v) for v in MEAN[::-1])
+_NO_AXIS = np.full(2, np.nan, np.float32)
+_NO_KEYPOINT = np.full((keypoints.COUNT, 3), np.nan, np.float32)
 
 
 def augmented(
     record: Record, size: int, rng: np.random.Generator, cropping: Cropping = ANY_CROPPING
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """A random square crop at a random scale, mirrored half of the time, with other colours: BGR, label and axes by
-    instance number - 1, where they are known.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """A random square crop at a random scale, mirrored half of the time, with other colours: BGR, label, axes and
+    keypoints by instance number - 1, where they are known.
 
     Where the crop is drawn towards a person, the scale is chosen by that person's size, so that people of all
     sizes in pixels are seen equally often.
     """
     image, label = record.decoded()
-    axis, box, instance = record.axis, *visible_boxes(label)[:2]
-    focus = 0
+    axis, keypoint, box, instance = record.axis, record.keypoint, *visible_boxes(label)[:2]
+    record_shape, focus = np.array(label.shape[:2]), 0
     if len(instance) and rng.random() < cropping.towards_person:
         chosen = rng.integers(len(instance))
         focus, extent = int(instance[chosen]), box[chosen]
@@ -173,10 +183,13 @@ def augmented(
     image = cv2.resize(image, shape, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     label = cv2.resize(label, shape, interpolation=cv2.INTER_NEAREST)
     corner = _corner(label, size, focus, rng)
+    middle, turn = np.array(corner) + size / 2, rotation(roll)
+    into = np.concatenate([turn, (size / 2 - turn @ middle)[:, None]], 1)
+    if keypoint is not None:
+        stretch = np.array(shape) / record_shape[::-1]
+        keypoint = keypoints.mapped(keypoint, into * np.array([*stretch, 1]))
     if roll:
-        middle = np.array(corner) + size / 2
-        turn = rotation(roll)
-        crop = PersonCrop(np.concatenate([turn, (size / 2 - turn @ middle)[:, None]], 1), np.zeros(4), size)
+        crop = PersonCrop(into, np.zeros(4), size)
         image, label = cut(image, crop, _FILL), cut_label(label, crop)
     else:
         image, label = _crop(image, corner, size, MEAN[::-1]), _crop(label, corner, size, np.zeros(4))
@@ -185,7 +198,8 @@ def augmented(
         label = label[:, ::-1].copy()
         label[..., :3] = mirror_iuv(label[..., :3])
         axis = None if axis is None else axis * np.float32([-1, 1])
-    return recoloured(np.ascontiguousarray(image), rng), label, axis
+        keypoint = None if keypoint is None else keypoints.mirrored(keypoint, size)
+    return recoloured(np.ascontiguousarray(image), rng), label, axis, keypoint
 
 
 def _corner(label: np.ndarray, size: int, focus: int, rng: np.random.Generator) -> tuple[int, int]:
@@ -224,11 +238,17 @@ def recoloured(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.clip(colour, 0, 255).astype(np.uint8)
 
 
-def truth_of(label: np.ndarray, axis: np.ndarray | None = None) -> Truth:
-    """axis: [people, 2] by instance number - 1."""
+def truth_of(label: np.ndarray, axis: np.ndarray | None = None, keypoint: np.ndarray | None = None) -> Truth:
+    """axis [people, 2] and keypoint [people, 33, 3]: by instance number - 1."""
     box, instance, ignore = visible_boxes(label)
-    own = np.full((len(box), 2), np.nan, np.float32) if axis is None else axis[instance.astype(int) - 1]
-    return Truth(*map(torch.from_numpy, (box, instance, ignore, label, own)))
+    own = (_rows_of(instance, axis, _NO_AXIS), _rows_of(instance, keypoint, _NO_KEYPOINT))
+    return Truth(*map(torch.from_numpy, (box, instance, ignore, label, *own)))
+
+
+def _rows_of(instance: Sequence[int], values: np.ndarray | None, unknown: np.ndarray) -> np.ndarray:
+    """Each instance's row of `values`, which has them by number - 1; `unknown` where there is none."""
+    rows = [unknown if values is None or n > len(values) else values[n - 1] for n in map(int, instance)]
+    return np.stack(rows).astype(np.float32) if rows else np.empty((0, *unknown.shape), np.float32)
 
 
 class Batches:

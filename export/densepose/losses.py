@@ -28,6 +28,7 @@ WEIGHTS = {
     "index": 1.0,
     "u": 3.0,
     "v": 3.0,
+    "keypoint": 0.3,
     "pixel_index": 1.0,
     "pixel_u": 1.5,
     "pixel_v": 1.5,
@@ -144,9 +145,11 @@ def _surface_terms(
     if any(len(d[0]) for d in dense):
         pooled = tg.pooled(features, [d[0] for d in dense], config, config.dense_pool, level=0)
         with autocast:
-            outputs = net.dense_head(pooled)
+            *outputs, keypoints = net.dense_head.with_keypoints(pooled)
         label = torch.cat([tg.dense_labels(*d, t, GRID) for d, t in zip(dense, truths, strict=True)])
         terms |= _dense_terms([o.float() for o in outputs], label)
+        if keypoints is not None:
+            terms["keypoint"] = _keypoint_loss(keypoints.float(), dense, truths)
     if pixel_head is not None:
         with autocast:
             output = pixel_head(features[0])
@@ -233,6 +236,17 @@ def _dense_terms(outputs: list[Tensor], label: Tensor) -> dict[str, Tensor]:
         "u": _coordinate_loss(u, value, label[..., 1]),
         "v": _coordinate_loss(v, value, label[..., 2]),
     }
+
+
+def _keypoint_loss(output: Tensor, dense: list[tuple[Tensor, Tensor]], truths: list[tg.Truth]) -> Tensor:
+    """output [P, 33, s, s]: the divergence of the distribution over the lattice from the target's, as a mean over known
+    keypoints (Mask R-CNN, 2017, section 5, with a Gaussian instead of one cell)."""
+    targets = [tg.keypoint_targets(*d, t, GRID) for d, t in zip(dense, truths, strict=True)]
+    wanted, known = (torch.cat(each) for each in zip(*targets, strict=True))
+    if not known.any():
+        return output.sum() * 0
+    log_probability = output.flatten(2).log_softmax(-1)[known]
+    return F.kl_div(log_probability, wanted[known], reduction="batchmean")
 
 
 def _coordinate_loss(output: Tensor, value: Tensor, wanted: Tensor) -> Tensor:

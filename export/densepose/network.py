@@ -355,7 +355,11 @@ class Aspp(nn.Module):
 
 
 class DenseHead(nn.Module):
-    """[P, C, 32, 32] -> coarse [P, 15, 64, 64], index, u and v [P, 25, 64, 64]; all raw logits or values."""
+    """[P, C, 32, 32] -> coarse [P, 15, 64, 64], index, u and v [P, 25, 64, 64]; all raw logits or values.
+
+    With `config.keypoints` also the logits of where each keypoint of the person is, [P, 33, 64, 64]: their softmax over
+    the lattice is its distribution, which is flat for what the box does not show.
+    """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -368,6 +372,8 @@ class DenseHead(nn.Module):
             "u": config.index_classes,
             "v": config.index_classes,
         }
+        if config.keypoints:
+            sizes["keypoints"] = config.keypoints
         self.out = nn.ModuleDict({name: nn.ConvTranspose2d(width, n, 4, 2, 1) for name, n in sizes.items()})
         for module in self.modules():
             if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
@@ -380,8 +386,12 @@ class DenseHead(nn.Module):
         return self.body(self.aspp(rois))
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        return self.with_keypoints(rois)[:4]
+
+    def with_keypoints(self, rois: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor | None]:
         x = self.surface(rois)
-        return self.out["coarse"](x), self.out["index"](x), self.out["u"](x), self.out["v"](x)
+        surface = (self.out["coarse"](x), self.out["index"](x), self.out["u"](x), self.out["v"](x))
+        return (*surface, self.out["keypoints"](x) if "keypoints" in self.out else None)
 
 
 class MobileParsingRCNN(nn.Module):

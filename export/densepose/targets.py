@@ -16,14 +16,15 @@ from export.shards import BOX_ALONE, UNSURE
 
 @dataclass(frozen=True)
 class Truth:
-    """One image's people: box [G, 4], instance number [G], ignore [G], label uint8 [H, W, 4], axis [G, 2]
-    (`export.shards.LabelledImage`; NaN where nobody knows)."""
+    """One image's people: box [G, 4], instance number [G], ignore [G], label uint8 [H, W, 4]; NaN where nobody knows:
+    axis [G, 2] (`export.shards.LabelledImage`), keypoint [G, 33, 3] (`export.shards.Record`)."""
 
     box: Tensor
     instance: Tensor
     ignore: Tensor
     label: Tensor
     axis: Tensor
+    keypoint: Tensor
 
     def to(self, device: torch.device) -> Truth:
         return Truth(*(getattr(self, field.name).to(device) for field in fields(self)))
@@ -136,6 +137,37 @@ def dense_labels(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> Tens
     own = (picked[..., 3] == truth.instance[person][:, None, None]) | (picked[..., 0] == UNSURE)
     own &= inside
     return picked[..., :3] * own[..., None]
+
+
+KEYPOINT_SIGMA = 1.0  # of a keypoint's target, cells
+SHOWN, HIDDEN = 0.5, 0.2  # from this probability on a keypoint is shown, below that one it is not
+
+
+def keypoint_targets(boxes: Tensor, person: Tensor, truth: Truth, grid: int) -> tuple[Tensor, Tensor]:
+    """Where the grid x grid lattice over each box shows the keypoints of its person: probabilities
+    [P, 33, grid * grid], and which of them are known, bool [P, 33].
+
+    A keypoint that is shown is a Gaussian around it. A keypoint outside of the box, behind another person, or hidden is
+    everywhere equally likely.
+    """
+    keypoint = truth.keypoint[person]
+    at, visible = keypoint[..., :2], keypoint[..., 2]
+    known = keypoint.isfinite().all(-1)
+    height, width = truth.label.shape[:2]
+    x, y = (at[..., k].nan_to_num(-1).floor().long() for k in (0, 1))
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    owner = truth.label[y.clamp(0, height - 1), x.clamp(0, width - 1), 3]
+    others = (owner > 0) & (owner != truth.instance[person][:, None])
+    size = (boxes[:, 2:] - boxes[:, :2]).clamp(min=1e-3)
+    cell = (at - boxes[:, None, :2]) / size[:, None] * grid  # continuous: cell k covers [k, k + 1)
+    inside &= ((cell >= 0) & (cell < grid)).all(-1)
+    shown = known & inside & ~others & (visible >= SHOWN)
+    hidden = known & (~inside | others | (visible < HIDDEN))
+    middles = torch.arange(grid, device=boxes.device) + 0.5
+    along = (-0.5 * ((middles - cell.nan_to_num(0)[..., None]) / KEYPOINT_SIGMA) ** 2).exp()  # [P, 33, 2, grid]
+    spread = (along[..., 1, :, None] * along[..., 0, None, :]).flatten(-2)
+    spread = spread / spread.sum(-1, keepdim=True).clamp(min=1e-12)
+    return torch.where(shown[..., None], spread, 1 / grid**2), shown | hidden
 
 
 def pooled(

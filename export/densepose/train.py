@@ -25,6 +25,7 @@ import torch
 from torch import nn
 from tqdm import tqdm
 
+from export import keypoints as person_keypoints
 from export.densepose import data
 from export.densepose.config import NetworkConfig
 from export.densepose.losses import PixelHead, batch_loss, crop_loss, surface_loss
@@ -157,7 +158,10 @@ class Run:
             # Another backbone's weights are not taken over, so there is nothing in it to keep.
             self.frozen |= saved.get("frozen", False) and config.backbone == "mobilenet_v2"
         axis = config.recipe != "scratch" or saved.get("axis", False)
-        net = MobileParsingRCNN(NetworkConfig(width=config.width, backbone=config.backbone, axis=axis))
+        keypoints = person_keypoints.COUNT if config.recipe == "usual" else saved.get("keypoints", 0)
+        net = MobileParsingRCNN(
+            NetworkConfig(width=config.width, backbone=config.backbone, axis=axis, keypoints=keypoints)
+        )
         self.net = net.to(device, memory_format=torch.channels_last)
         self.pixel_head = PixelHead(net.config).to(device)
         if self.frozen:
@@ -220,6 +224,7 @@ class Run:
         progress = {"step": self.step, "images": self.images, "spent": self.spent_s, "log": self.log}
         network = self.net.config
         kind = {"width": network.width, "backbone": network.backbone, "axis": network.axis, "frozen": self.frozen}
+        kind["keypoints"] = network.keypoints
         for path in (self.checkpoint, self.steady) if keep else (self.checkpoint,):
             save_atomically({**state, **progress, **kind}, path)
         # The averaged weights in half precision are shipped, and another run may start from them.

@@ -62,7 +62,7 @@ def validate_surface(
     rng = np.random.default_rng(0)
     right = body = both = either = 0
     for record in records:
-        image, label, _ = data.augmented(record, size, rng, cropping)
+        image, label, *_ = data.augmented(record, size, rng, cropping)
         tensor = torch.from_numpy(data.normalised(image))[None].to(device)
         found = pixel_head.index(net.detector(tensor)[0][0])[0].argmax(0).cpu().numpy()
         part = PixelHead.cells(label[None])[0, ..., 0]

@@ -34,9 +34,9 @@ from export.evaluation.people import (
     touches_frame,
 )
 from export.evaluation.surface_accuracy import fraction
+from export.keypoints import NAMES
 from export.surface import LIMB_SIDE
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 
 MIN_HEIGHT_PX = 64
 MIN_TEACHER_SCORE = 0.5

@@ -12,10 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 import torch
 
+from export.keypoints import NAMES
 from export.people.atlas import REGIONS, smooth_normals, vertex_regions
 from export.people.body import Body, sample_phenotype
 from export.people.charts import Mesh
-from export.teachers.landmarks import NAMES
 
 # Joint: (its parent, the bone whose head it turns about, prefixes of the bones that go with it). Parents come first.
 _MIDDLE = {
@@ -111,7 +111,7 @@ class Pieces:
 class Puppet:
     """Body in a shape and a pose. `sample` is a subset of the body's vertices, evenly spread; `whole` is all of them.
 
-    `landmarks` holds the 33 landmarks in the order of `export.teachers.landmarks.NAMES`; `has_landmark` [33] says
+    `landmarks` holds the 33 landmarks in the order of `export.keypoints.NAMES`; `has_landmark` [33] says
     which of them the body has. joint_rest [19, 3], joint_basis [SHAPES, 19, 3]: where the joints are at rest.
     """
 

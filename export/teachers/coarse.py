@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from export.teachers.landmarks import NAMES
+from export.keypoints import NAMES
 
 BACKGROUND, SOMEWHERE = 0, 255  # label values beside the coarse regions 1..14
 _MIN_VISIBLE = 0.6

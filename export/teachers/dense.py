@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from export import surface
 from export.camera import Camera
+from export.keypoints import NAMES
 from export.people import render
 from export.people.atlas import Atlas
 from export.people.lookup import LabelLookup
@@ -17,7 +18,6 @@ from export.people.wardrobe import Layer, Model
 from export.teachers.body_model import JOINT, Puppet
 from export.teachers.fitting import CannotFit, Fit, Target, fit_person, inside, neck_angle
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.pose_start import SHOWN
 
 LONGEST_SIDE = 1024

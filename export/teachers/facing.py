@@ -17,9 +17,9 @@ import numpy as np
 from tqdm import tqdm
 
 from export.jobs import Workers, results
+from export.keypoints import NAMES
 from export.photos.packages import PackageError
 from export.teachers.label import Find, PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.stored import Stored
 
 EPILOG = """\

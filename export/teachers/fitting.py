@@ -14,9 +14,9 @@ import torch
 from scipy.spatial.transform import Rotation
 from torch.nn import functional
 
+from export.keypoints import NAMES
 from export.people.atlas import REGIONS
 from export.teachers.body_model import JOINT, JOINTS, PARENT, SHAPES, Puppet, chained, turns
-from export.teachers.landmarks import NAMES
 from export.teachers.pose_start import FACING_CAMERA, SHOWN, start_pose, turn_onto
 
 FOCAL = 1.2  # of the photo's longer side: about 45 degrees

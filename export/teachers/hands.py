@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from export.keypoints import NAMES
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.models import model_file
 
 SIDE = 224

@@ -10,13 +10,6 @@ import numpy as np
 from export.teachers.models import model_file
 
 SIDE = 256
-NAMES = (
-    "nose", "left eye inner", "left eye", "left eye outer", "right eye inner", "right eye", "right eye outer",
-    "left ear", "right ear", "mouth left", "mouth right", "left shoulder", "right shoulder", "left elbow",
-    "right elbow", "left wrist", "right wrist", "left little finger", "right little finger", "left index finger",
-    "right index finger", "left thumb", "right thumb", "left hip", "right hip", "left knee", "right knee",
-    "left ankle", "right ankle", "left heel", "right heel", "left toe", "right toe",
-)  # fmt: skip
 _MIDDLE, _TOP = 33, 34  # auxiliary: middle of the hips, and a point above it on the circle around the whole person
 _MARGIN = 1.25
 

@@ -25,7 +25,7 @@ from export.people.animals import load_animals
 from export.people.motion import load_clips
 from export.people.wardrobe import Fabrics
 from export.shards import Record, load_records
-from export.teachers.shards import write_training_set
+from export.teachers.shards import Picture, write_training_set
 
 DATA = Path(".data")
 SPLITS = ("train", "val")
@@ -77,6 +77,8 @@ def _fill(pack: PackWriter, photos: Path, sizes: Sizes) -> None:
     for k, record in enumerate(_photographs(photos)):
         pack.add(f"photographs/{k:04d}.jpg", record.image)
         pack.add(f"photographs/{k:04d}.png", record.label)
+        if record.keypoint is not None:
+            pack.add_arrays(f"photographs/{k:04d}.npz", keypoint=record.keypoint)
 
 
 def _add_animals(pack: PackWriter, coats: int) -> None:
@@ -125,14 +127,20 @@ def open_pack(path: Path, composed: int) -> None:
         tiles = [_decoded(files[name]) for name in sorted(files) if name.startswith(f"fabrics/{split}/")]
         assets.save_cache(assets.cache_dir() / f"fabrics-{split}.npz", tiles=np.stack(tiles))
     names = sorted(name for name in files if name.startswith("photographs/") and name.endswith(".jpg"))
-    pictures = [
-        (_decoded(files[name]), _decoded(files[name.replace(".jpg", ".png")], cv2.IMREAD_UNCHANGED)) for name in names
-    ]
+    pictures = [_photograph(files, name.removesuffix(".jpg")) for name in names]
     empty = [_decoded(files[name]) for name in sorted(files) if name.startswith("backgrounds/train/")]
-    without = [(image, np.zeros((*image.shape[:2], 4), np.uint8)) for image in empty]
+    without = [(image, np.zeros((*image.shape[:2], 4), np.uint8), None) for image in empty]
     rounds = [list(range(len(pictures)))] * 4
     people, count = write_training_set(pictures, without, rounds, composed, DATA / "photos/shards/train")
     print(f"{len(pictures)} photographs of people, {len(empty)} without, {count} composed of {people} people cut out")
+
+
+def _photograph(files: dict[str, bytes], name: str) -> Picture:
+    keypoint = None
+    if f"{name}.npz" in files:
+        with np.load(io.BytesIO(files[f"{name}.npz"])) as kept:
+            keypoint = kept["keypoint"]
+    return _decoded(files[f"{name}.jpg"]), _decoded(files[f"{name}.png"], cv2.IMREAD_UNCHANGED), keypoint
 
 
 def _decoded(content: bytes, flag: int = cv2.IMREAD_COLOR) -> np.ndarray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from export.keypoints import NAMES
 from export.teachers.body_model import JOINT, JOINTS, PARENT, Puppet
-from export.teachers.landmarks import NAMES
 
 # Columns: the body's x (left), y (back) and z (up) in camera axes, for somebody who faces the camera.
 FACING_CAMERA = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from export.keypoints import NAMES
 from export.people.body import Body
 from export.people.motion import LIMBS, PHOTO_POSES, limb_directions, without_yaw
 from export.teachers.body_model import JOINT
 from export.teachers.fit import PhotoFits
 from export.teachers.fitting import inside
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.pose_start import SHOWN
 
 EPILOG = """\

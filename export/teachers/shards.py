@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from export import keypoints
 from export.people.augmentation import USUAL
 from export.shards import BOX_ALONE, PART_ALONE, PERSON, REGION, UNCERTAIN, UNSURE, ShardWriter, visible_boxes
 from export.surface import PART_COUNT, PART_TO_COARSE
@@ -37,6 +38,9 @@ PER_SHARD = 100
 JPEG_QUALITY = 92
 _SIZES_APART = (0.5, 0.3, 0.15, 0.05, 0.0, 0.0)  # of 1, 2, ... 6 people
 _GROUP_SIZES = (0.0, 0.4, 0.25, 0.15, 0.1, 0.1)
+_UNKNOWN = np.full((keypoints.COUNT, 3), np.nan, np.float32)
+# Image uint8 [H, W, 3], label uint8 [H, W, 4], keypoints [people, 33, 3] by instance number - 1 where there are any.
+Picture = tuple[np.ndarray, np.ndarray, np.ndarray | None]
 
 
 def weak_label(
@@ -91,15 +95,23 @@ def weak_label(
 @dataclass(frozen=True)
 class CutOut:
     """One person out of a photo. image: uint8 [h, w, 3]; label: uint8 [h, w, 4] with instance 1, 0 and UNSURE around
-    it; opacity: float32 [h, w]; cut: the person is cut by the photo's left, upper, right, lower border."""
+    it; opacity: float32 [h, w]; cut: the person is cut by the photo's left, upper, right, lower border; keypoint:
+    [33, 3], NaN where nobody knows them."""
 
     image: np.ndarray
     label: np.ndarray
     opacity: np.ndarray
     cut: tuple[bool, bool, bool, bool]
+    keypoint: np.ndarray
 
 
-def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
+def keypoints_of(labels: PhotoLabels) -> np.ndarray:
+    """Keypoints float32 [N, 33, 3] of the N people as in `export.shards.Record`; NaN where landmarks are not sure."""
+    keypoint = np.concatenate([labels.point, labels.visible[..., None]], -1).astype(np.float32)
+    return np.where(labels.sure[:, None, None], keypoint, np.nan)
+
+
+def cut_outs(image: np.ndarray, label: np.ndarray, keypoint: np.ndarray | None = None) -> list[CutOut]:
     """People with a mask that no other label touches; people truncated on opposite sides cannot be put elsewhere."""
     out = []
     height, width = label.shape[:2]
@@ -118,14 +130,14 @@ def cut_outs(image: np.ndarray, label: np.ndarray) -> list[CutOut]:
                 this[..., 3] = own[place]
                 # The photo's own background shows through at hair and edges: two pixels less, and soft.
                 inner = cv2.erode(own.astype(np.float32), np.ones((3, 3)), borderType=cv2.BORDER_REPLICATE)
-                out.append(CutOut(image[place], this, cv2.GaussianBlur(inner, (0, 0), 1.0)[place], cut))
+                opacity = cv2.GaussianBlur(inner, (0, 0), 1.0)[place]
+                known = _UNKNOWN if keypoint is None else keypoint[number - 1] - np.float32([x0, y0, 0])
+                out.append(CutOut(image[place], this, opacity, cut, known))
     return out
 
 
-def composed(
-    background: np.ndarray, people: list[CutOut], size: tuple[int, int], rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    """One to six people, the later ones in front, on a piece of a photo without people: image and label.
+def composed(background: np.ndarray, people: list[CutOut], size: tuple[int, int], rng: np.random.Generator) -> Picture:
+    """One to six people, the later ones in front, on a piece of a photo without people.
 
     Half of the images show a group: people of about one size side by side, each occluding a part of the one before.
     size: width, height of the result. Borders that cut a person in the photo cut them here too.
@@ -139,6 +151,7 @@ def composed(
     label = np.zeros((height, width, 4), np.uint8)
     group = rng.random() < 0.5
     before = None  # left, top, width, height of the person before
+    keypoint = []
     for number in range(1, int(rng.choice(6, p=_GROUP_SIZES if group else _SIZES_APART)) + 2):
         person = people[rng.integers(len(people))]
         tall = height * np.exp(rng.uniform(np.log(0.3), np.log(1.2)))
@@ -160,6 +173,8 @@ def composed(
             if not (person.cut[1] or person.cut[3]):
                 top = round(before[1] + before[3] - shape[1] + rng.normal(0, 0.05) * before[3])
         before = (left, top, *shape)
+        stretch = np.array(shape) / person.label.shape[1::-1]
+        keypoint.append(keypoints.mapped(person.keypoint, np.array([[stretch[0], 0, left], [0, stretch[1], top]])))
         into = np.s_[max(top, 0) : max(top + shape[1], 0), max(left, 0) : max(left + shape[0], 0)]
         rows, columns = image[into].shape[:2]
         part = np.s_[max(-top, 0) : max(-top, 0) + rows, max(-left, 0) : max(-left, 0) + columns]
@@ -171,7 +186,7 @@ def composed(
             1:-1, 1:-1
         ]
         label[into][(edge > 0) & ~seen & (label[into][..., 3] == 0), 0] = UNSURE
-    return np.clip(image, 0, 255).astype(np.uint8), label
+    return np.clip(image, 0, 255).astype(np.uint8), label, np.stack(keypoint)
 
 
 def _place(length: int, room: int, cut_low: bool, cut_high: bool, rng: np.random.Generator) -> int:
@@ -182,24 +197,26 @@ def _place(length: int, room: int, cut_low: bool, cut_high: bool, rng: np.random
     return int(rng.integers(low, max(room - 3 * length // 4, low) + 1))
 
 
-def shrunk(image: np.ndarray, label: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """image: uint8 [H, W, 3] BGR and its label, with a long side of at most LONG_SIDE."""
+def shrunk(image: np.ndarray, label: np.ndarray, keypoint: np.ndarray | None = None) -> Picture:
+    """image: uint8 [H, W, 3] BGR, its label and keypoints, with a long side of at most LONG_SIDE."""
     scale = LONG_SIDE / max(image.shape[:2])
     if scale >= 1:
-        return image, label
+        return image, label, keypoint
     size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return small, cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
+    if keypoint is not None:
+        keypoint = keypoint * np.append(np.array(size) / image.shape[1::-1], 1).astype(np.float32)
+    return small, cv2.resize(label, size, interpolation=cv2.INTER_NEAREST), keypoint
 
 
-def write_shards(pictures: Iterator[tuple[np.ndarray, np.ndarray]], count: int, out: Path) -> None:
+def write_shards(pictures: Iterator[Picture], count: int, out: Path) -> None:
     """Writes `count` images and labels to out/shard-00000.npz and so on."""
     out.mkdir(parents=True, exist_ok=True)
     with tqdm(total=count, desc=str(out), unit="image", disable=None) as bar:
         for number in range(-(-count // PER_SHARD)):
             shard = ShardWriter(boxes=False)
-            for image, label in itertools.islice(pictures, PER_SHARD):
-                shard.add(image, label, JPEG_QUALITY)
+            for image, label, keypoint in itertools.islice(pictures, PER_SHARD):
+                shard.add(image, label, JPEG_QUALITY, keypoint=keypoint)
                 bar.update()
             shard.write(out / f"shard-{number:05d}.npz", {"split": out.name, "shard": number, "generator": "photos"})
 
@@ -220,9 +237,8 @@ def rounds_of(names: list[str], repeat: int, caps: dict[str, int]) -> list[list[
 
 
 def write_training_set(
-    pictures: list[tuple[np.ndarray, np.ndarray]], empty: list[tuple[np.ndarray, np.ndarray]], rounds: list[list[int]],
-    composed_images: int, out: Path,
-) -> tuple[int, int]:  # fmt: skip
+    pictures: list[Picture], empty: list[Picture], rounds: list[list[int]], composed_images: int, out: Path
+) -> tuple[int, int]:
     """Shards of images with people and without, and of images composed of both. rounds: indices of the images with
     people; each round has all images without. Returns how many people were cut out of the first round's images and how
     many images composed."""
@@ -321,7 +337,7 @@ def main(argv: list[str] | None = None) -> int:
         label = weak_label(told, image.shape[:2], fits, hands, facing)
         if consensus:
             label = consensus.complete(image, label)
-        pictures.append(shrunk(image, label))
+        pictures.append(shrunk(image, label, keypoints_of(told)))
     if not pictures:
         print(f"None of the {len(photos)} photos has a person with landmarks and mask.", file=sys.stderr)
         return 1

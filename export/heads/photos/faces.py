@@ -19,9 +19,9 @@ from tqdm import tqdm
 
 from export.heads.head_shards import CROP_SIDES, SIDE
 from export.heads.photos.face_points import FacePoints, read_face_points
+from export.keypoints import NAMES
 from export.teachers.faces import Face, FaceDetector, FaceNetwork, Square, faces_of
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.stored import Stored
 
 SPLITS = ("train", "val", "test")

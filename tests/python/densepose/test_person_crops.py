@@ -90,7 +90,7 @@ def test_a_mirrored_image_has_the_mirrored_axis():
     record = as_record(*tilted(40, seed=4))
     signs = set()
     for seed in range(8):
-        _, label, axis = data.augmented(record, 96, np.random.default_rng(seed))
+        _, label, axis, _ = data.augmented(record, 96, np.random.default_rng(seed))
         if (label[..., 0] == 23).sum() > 10 and (label[..., 0] == 9).sum() > 10:
             head, leg = (np.argwhere(label[..., 0] == part).mean(0)[::-1] for part in (23, 9))
             assert np.sign((head - leg)[0]) == np.sign(axis[0, 0])
@@ -102,7 +102,7 @@ def test_photographs_are_turned_and_tilted_renderings_are_not():
     image, label = picture(np.random.default_rng(0), people=1)
     cropping = data.Cropping(towards_person=1, rolls=((1.0, 90, 90),))
     for axis, turned in ((None, True), (np.float32([[0, -1]]), False)):
-        _, marked, _ = data.augmented(as_record(image, label, axis), 96, np.random.default_rng(3), cropping)
+        _, marked, *_ = data.augmented(as_record(image, label, axis), 96, np.random.default_rng(3), cropping)
         head, leg = (np.argwhere(marked[..., 0] == part).mean(0) for part in (23, 9))
         down, across = np.abs(head - leg)
         assert (across > down) == turned

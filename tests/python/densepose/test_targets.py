@@ -19,9 +19,8 @@ def truth(boxes, ignore=None) -> tg.Truth:
     boxes = torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4)
     ignore = torch.tensor(ignore or [False] * len(boxes), dtype=torch.bool)
     instance = torch.arange(1, len(boxes) + 1, dtype=torch.uint8)
-    return tg.Truth(
-        boxes, instance, ignore, torch.zeros(160, 160, 4, dtype=torch.uint8), torch.full((len(boxes), 2), torch.nan)
-    )
+    unknown = (torch.full((len(boxes), *shape), torch.nan) for shape in ((2,), (33, 3)))
+    return tg.Truth(boxes, instance, ignore, torch.zeros(160, 160, 4, dtype=torch.uint8), *unknown)
 
 
 @pytest.fixture
@@ -114,7 +113,7 @@ def test_a_mirrored_cut_carries_the_mirrored_labels():
     record = as_record(image, label)
     seen = set()
     for seed in range(12):
-        cut, marked, _ = data.augmented(record, 128, np.random.default_rng(seed))
+        cut, marked, *_ = data.augmented(record, 128, np.random.default_rng(seed))
         assert cut.shape == (128, 128, 3)
         columns = {part: np.nonzero(marked[..., 0] == part)[1] for part in (9, 10, 23, 24)}
         if min(len(c) for c in (columns[9], columns[10])) < 20:
@@ -141,7 +140,7 @@ def as_record(image: np.ndarray, label: np.ndarray) -> Record:
 
 def test_boxes_of_a_cut_are_around_what_is_left_of_a_person():
     image, label = picture(np.random.default_rng(0), people=2)
-    _, marked, _ = data.augmented(as_record(image, label), 96, np.random.default_rng(1))
+    _, marked, *_ = data.augmented(as_record(image, label), 96, np.random.default_rng(1))
     people = data.truth_of(marked)
     for box, number in zip(people.box.int().tolist(), people.instance.tolist(), strict=True):
         y, x = np.nonzero(marked[..., 3] == number)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from export.keypoints import NAMES
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 
 SIZE = 200
 BOX = np.array([[40, 20, 120, 180]], np.float32)

@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from export.keypoints import NAMES
 from export.teachers import facing
 from export.teachers.facing import BACK, CHEST, PhotoFacing, agreed, face_photo, facing_of, main, trunk_part
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES, Landmarks
+from export.teachers.landmarks import Landmarks
 
 IMAGE = np.zeros((100, 200, 3), np.uint8)
 

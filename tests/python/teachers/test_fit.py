@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from export import surface
+from export.keypoints import NAMES
 from export.people import assets
-from export.teachers.landmarks import NAMES
 
 pytest.importorskip("torch")
 pytest.importorskip("moderngl")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from export.keypoints import NAMES
 from export.teachers import hands
 from export.teachers.hands import Hand, hands_of
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 
 SHAPE = (200, 200)
 

@@ -8,6 +8,7 @@ import pytest
 
 from export import surface
 from export.densepose import data
+from export.keypoints import NAMES
 from export.shards import (
     BOX_ALONE,
     PART_ALONE,
@@ -24,7 +25,6 @@ from export.teachers.facing import PhotoFacing
 from export.teachers.fit import PhotoFits
 from export.teachers.hands import Hand
 from export.teachers.label import PhotoLabels
-from export.teachers.landmarks import NAMES
 from export.teachers.shards import LONG_SIDE, composed, cut_outs, main, rounds_of, weak_label
 
 SHAPE = (100, 200)
@@ -239,7 +239,7 @@ def test_people_are_cut_out_who_stand_alone():
 def test_composed_images_label_each_person_where_it_is_seen():
     people = cut_outs(*cut_out_scene())
     for seed in range(12):
-        image, label = composed(
+        image, label, _ = composed(
             np.full((90, 120, 3), (0, 200, 0), np.uint8), people, (160, 128), np.random.default_rng(seed)
         )
         assert image.shape == (128, 160, 3)
@@ -252,6 +252,25 @@ def test_composed_images_label_each_person_where_it_is_seen():
         # The person was cut by the lower border, and still is.
         assert body.any()
         assert body[-1].any()
+
+
+def test_keypoints_stay_on_the_people_who_are_cut_out():
+    image, label = cut_out_scene()
+    label[100:110, 40:50, 0] = 24
+    known = np.zeros((1, 33, 3), np.float32)
+    known[0, 5] = 45, 105, 1
+    people = cut_outs(image, label, known)
+    seen = 0
+    for seed in range(12):
+        _, marked, keypoint = composed(
+            np.zeros((90, 120, 3), np.uint8), people, (160, 128), np.random.default_rng(seed)
+        )
+        for person, (x, y, visible) in enumerate(keypoint[:, 5]):
+            assert visible == 1
+            if 0 <= x < 160 and 0 <= y < 128 and marked[int(y), int(x), 3] == person + 1:
+                assert marked[int(y), int(x), 0] == 24
+                seen += 1
+    assert seen > 6
 
 
 def test_half_of_the_composed_images_show_people_side_by_side():

@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from export import surface
-from export.teachers import detector, landmarks
+from export import keypoints, surface
+from export.teachers import detector
 from export.teachers.coarse import SOMEWHERE, coarse_labels
 from export.teachers.label import PhotoLabels, agrees, draw, label_photo, whole_bodies
 from export.teachers.landmarks import SIDE, LandmarkNetwork, Landmarks
@@ -228,7 +228,7 @@ def test_large_photos_are_also_asked_in_quarters(shape, windows):
 
 
 def test_each_landmark_has_a_name():
-    assert len(set(landmarks.NAMES)) == 33
+    assert len(set(keypoints.NAMES)) == 33
 
 
 def standing() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -239,7 +239,7 @@ def standing() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         "toe": (24, 272),
     }  # fmt: skip
     point = np.full((33, 2), [100.0, 30.0], np.float32)
-    for k, name in enumerate(landmarks.NAMES):
+    for k, name in enumerate(keypoints.NAMES):
         side, _, joint = name.partition(" ")
         if joint in place:
             x, y = place[joint]
@@ -264,7 +264,7 @@ def test_pixels_near_a_bone_get_its_region_and_doubtful_ones_none():
 
 def test_labels_of_the_mirrored_person_are_mirrored():
     point, visible, mask = standing()
-    other = [landmarks.NAMES.index(_swapped(name)) for name in landmarks.NAMES]
+    other = [keypoints.NAMES.index(_swapped(name)) for name in keypoints.NAMES]
     label = coarse_labels(point, visible, mask)
     mirrored = coarse_labels((point * [-1, 1] + [200, 0])[other], visible[other], mask[:, ::-1])
     table = np.arange(256, dtype=np.uint8)
@@ -278,7 +278,7 @@ def _swapped(name: str) -> str:
 
 def test_limbs_that_are_not_seen_give_no_labels():
     point, visible, mask = standing()
-    visible[[landmarks.NAMES.index(f"left {joint}") for joint in ("knee", "ankle", "toe")]] = 0.1
+    visible[[keypoints.NAMES.index(f"left {joint}") for joint in ("knee", "ankle", "toe")]] = 0.1
     label = coarse_labels(point, visible, mask)
     assert not np.isin([4, 7, 9], label).any()
     assert np.isin([5, 6, 8], label).all()

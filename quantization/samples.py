@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
+from export.densepose import bundle as bundle_format
 from export.densepose import targets as tg
 from export.densepose.data import PERSON_CROPPING, normalised
 from export.densepose.decode import detect
@@ -50,6 +51,8 @@ def collect(bundle: Bundle, records: list[Record], people: int) -> dict[str, lis
         if len(found.boxes):
             rois = tg.pooled(found.features, [found.boxes[:people]], network, network.dense_pool, level=0)
             given["dense_head"] = [rois]
+            if bundle_format.KEYPOINTS in samples:
+                add(bundle_format.KEYPOINTS, [bundle.surface(rois)])
         for name, tensors in given.items():
             add(name, tensors if name == "trunk" else [tensor.permute(0, 2, 3, 1) for tensor in tensors])
         if bundle.crop_graphs is not None:

@@ -48,7 +48,7 @@ class DensePoseSettings:
     the error. people_per_image: at most so many people of an image calibrate the dense head.
     """
 
-    GRAPHS: ClassVar[tuple[str, ...]] = densepose.GRAPHS + densepose.CROP_GRAPHS
+    GRAPHS: ClassVar[tuple[str, ...]] = (*densepose.GRAPHS, densepose.KEYPOINTS, *densepose.CROP_GRAPHS)
 
     graphs: dict[str, GraphSettings]
     calibration_images: int

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from export import data_sources as sources
+from export import keypoints
 from export.bundle import BundleInfo, Signature
 from export.bundle import write_manifest as write_bundle_manifest
 from export.densepose.config import DecodeConfig, NetworkConfig
@@ -15,6 +16,7 @@ from export.surface_grid import FILE as SURFACE_GRID
 
 GRAPHS = ("trunk", "rpn_fine", "rpn_coarse", "box_head", "dense_head")
 CROP_GRAPHS = ("crop_trunk", "crop_dense_head")  # of bundles with networks of their own for person crops
+KEYPOINTS = "keypoints"  # graph of bundles whose network has them
 CHARTS, CROP_CHARTS = "charts.f32", "crop_charts.f32"
 LEVELS = (2, 3, 4, 5, 6)
 EVIDENCE = "person"  # output of the trunk where the network has it
@@ -55,6 +57,8 @@ def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signatu
         "inputs": rois(pool),
         "outputs": {"labels": ["people", pool, pool, 4 * classes], "surface": ["people", pool, pool, width]},
     }
+    surface, points = ({name: ["people", pool, pool, channels]} for name, channels in
+                       (("surface", width), (KEYPOINTS, 4 * network.keypoints)))  # fmt: skip
     crop_trunk = {"inputs": image, "outputs": maps("p", LEVELS[:1], width)}
     evidence = {EVIDENCE: [1, *sizes[4], 1]} if network.evidence else {}
     return {
@@ -63,7 +67,9 @@ def signatures(network: NetworkConfig, crops: bool = False) -> dict[str, Signatu
         "rpn_coarse": rpn(LEVELS[1:]),
         "box_head": {"inputs": rois(network.box_pool), "outputs": {"boxes": ["people", 6]}},
         "dense_head": dense_head,
-    } | ({"crop_trunk": crop_trunk, "crop_dense_head": dense_head} if crops else {})
+        **({KEYPOINTS: {"inputs": surface, "outputs": points}} if network.keypoints else {}),
+        **({"crop_trunk": crop_trunk, "crop_dense_head": dense_head} if crops else {}),
+    }
 
 
 def write_manifest(
@@ -114,6 +120,7 @@ def write_manifest(
             "mask_threshold": decode.mask_threshold,
             "min_visible_fraction": decode.min_visible_fraction,
         },
+        **({KEYPOINTS: {"names": [name.replace(" ", "_") for name in keypoints.NAMES]}} if network.keypoints else {}),
         "charts": {"file": CHARTS},
         "surface": {"file": SURFACE_GRID},
     }

@@ -25,6 +25,7 @@ from export.densepose.network import MobileParsingRCNN
 
 # The dense head sees a box and this fraction of its width and height on each side, as in the C++ runtime.
 REGION_MARGIN = (0.03, 0.05)
+KEYPOINT_REACH = 2  # cells
 
 Detector = Callable[[Tensor], tuple[list[Tensor], list[Tensor], list[Tensor], Tensor | None]]
 BoxHead = Callable[[Tensor], tuple[Tensor, Tensor]]
@@ -33,12 +34,13 @@ DenseHead = Callable[[Tensor], tuple[Tensor, Tensor, Tensor, Tensor]]
 
 @dataclass(frozen=True)
 class Graphs:
-    """The three callables; shapes as in docs/reference/formats.md (the detector returns P2..P6, objectness, deltas, and
-    the evidence of people, if any)."""
+    """The callables; shapes as in docs/reference/formats.md (the detector returns P2..P6, objectness, deltas, and the
+    evidence of people, if any). keypoints: RoIs of the dense head -> logits [P, 33, s, s]; None without them."""
 
     detector: Detector
     box_head: BoxHead
     dense_head: DenseHead
+    keypoints: Callable[[Tensor], Tensor] | None = None
 
     @staticmethod
     def of_network(net: MobileParsingRCNN) -> Graphs:
@@ -46,18 +48,23 @@ class Graphs:
             features, evidence = net.trunk(image)
             return features, *net.rpn(features), evidence
 
-        return Graphs(detector, net.box_head, net.dense_head)
+        def keypoints(rois: Tensor) -> Tensor:
+            return net.dense_head.with_keypoints(rois)[-1]
+
+        return Graphs(detector, net.box_head, net.dense_head, keypoints if net.config.keypoints else None)
 
 
 @dataclass(frozen=True)
 class Result:
     """boxes float32 [K, 4] in source pixels, scores float32 [K] (falling), iuv uint8 [H, W, 3] = (I, U*255,
-    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for none). Each person has at least one pixel."""
+    V*255), instance uint8 [H, W] (k + 1 for person k, 0 for none). Each person has at least one pixel. keypoint float32
+    [K, 33, 3]: x, y in source pixels and confidence; None where the network has none."""
 
     boxes: np.ndarray
     scores: np.ndarray
     iuv: np.ndarray
     instance: np.ndarray
+    keypoint: np.ndarray | None = None
 
 
 def network_input(image: np.ndarray, long_side: int) -> tuple[Tensor, float, float]:
@@ -122,8 +129,11 @@ def infer(
     iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
     inner = (round(height / found.scale[1]), round(width / found.scale[0]))
     regions = regions_of(found.boxes, *inner)
+    points = None
     if len(regions):
-        maps = graphs.dense_head(tg.pooled(found.features, [regions], network, network.dense_pool, level=0))
+        rois = tg.pooled(found.features, [regions], network, network.dense_pool, level=0)
+        maps = graphs.dense_head(rois)
+        points = graphs.keypoints(rois) if graphs.keypoints else None
     to_image = found.boxes.new_tensor(found.scale * 2)
     boxes = found.boxes * to_image
     painted: list[int] = []
@@ -131,7 +141,31 @@ def infer(
         # A box without a body is a false alarm; one whose body is another person's already shows that person again.
         if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
-    return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance)
+    keypoint = None
+    if points is not None:
+        keypoint = keypoints_of(points[painted], regions[painted] * to_image).numpy()
+    return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance, keypoint)
+
+
+def keypoints_of(logits: Tensor, regions: Tensor) -> Tensor:
+    """Where the keypoints of each person are, [P, 33, 3]: x and y in the units of `regions` [P, 4], and confidence.
+
+    logits: [P, 33, s, s] over the regions. A keypoint lies in the middle of the probability in a window of
+    2 KEYPOINT_REACH + 1 cells each way around its likeliest cell (the first of several). Its confidence is the
+    probability in the window.
+    """
+    side = logits.shape[-1]
+    probability = logits.flatten(2).softmax(-1)
+    best = probability.argmax(-1)
+    row, column = best // side, best % side
+    at = torch.arange(side)
+    near = [(at - k[..., None]).abs() <= KEYPOINT_REACH for k in (row, column)]
+    window = probability.unflatten(-1, (side, side)) * near[0][..., :, None] * near[1][..., None, :]
+    mass = window.sum((-2, -1))
+    y = (window.sum(-1) * (at + 0.5)).sum(-1) / mass
+    x = (window.sum(-2) * (at + 0.5)).sum(-1) / mass
+    low, size = regions[:, None, :2], regions[:, None, 2:] - regions[:, None, :2]
+    return torch.cat([low + torch.stack([x, y], -1) / side * size, mass[..., None]], -1)
 
 
 def regions_of(boxes: Tensor, height: int, width: int) -> Tensor:

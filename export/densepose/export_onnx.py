@@ -94,28 +94,44 @@ class BoxHeadGraph(nn.Module):
         return self.predict(self.convs(channels_first(rois)).permute(0, 2, 3, 1).flatten(1))
 
 
-class DenseHeadGraph(nn.Module):
-    """The dense head without U and V: these need few pixels of few parts, and are computed where they are needed
-    from `surface` and the chart weights.
-
-    The transposed convolutions (kernel 4, stride 2, padding 1) of the other two predictors are written as one plain
+class PhasePredictor(nn.Module):
+    """Predictors over one map. The transposed convolutions (kernel 4, stride 2, padding 1) are written as one plain
     convolution of kernel 2 for each phase of the output, which int8 kernels exist for, with the same multiply-adds.
     """
 
-    def __init__(self, net: MobileParsingRCNN) -> None:
+    def __init__(self, layers: list[nn.ConvTranspose2d]) -> None:
         super().__init__()
-        self.head = net.dense_head
-        layers = [net.dense_head.out[name] for name in ("coarse", "index")]
         weight = torch.cat([layer.weight.detach() for layer in layers], 1)
-        bias = torch.cat([layer.bias.detach() for layer in layers])
-        self.bias = nn.Parameter(bias)
+        self.bias = nn.Parameter(torch.cat([layer.bias.detach() for layer in layers]))
         self.phases = nn.ParameterList([phase_weights(weight, *divmod(k, 2)) for k in range(4)])
+
+    def predicted(self, x: Tensor) -> Tensor:
+        """[P, C, h, w] -> [P, 4 x outputs, h, w], a phase after the other."""
+        conv = PhaseConv.apply if torch.onnx.is_in_onnx_export() else functools.partial(PhaseConv.forward, None)
+        return torch.cat([conv(x, weight, self.bias, *divmod(k, 2)) for k, weight in enumerate(self.phases)], 1)
+
+
+class DenseHeadGraph(PhasePredictor):
+    """The dense head without U and V: these need few pixels of few parts, and are computed where they are needed
+    from `surface` and the chart weights."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__([net.dense_head.out[name] for name in ("coarse", "index")])
+        self.head = net.dense_head
 
     def forward(self, rois: Tensor) -> tuple[Tensor, Tensor]:
         surface = self.head.surface(channels_first(rois))
-        conv = PhaseConv.apply if torch.onnx.is_in_onnx_export() else functools.partial(PhaseConv.forward, None)
-        labels = [conv(surface, weight, self.bias, *divmod(k, 2)) for k, weight in enumerate(self.phases)]
-        return channels_last(torch.cat(labels, 1)), channels_last(surface)
+        return channels_last(self.predicted(surface)), channels_last(surface)
+
+
+class KeypointGraph(PhasePredictor):
+    """Logits of the keypoints from the dense head's `surface`: a graph of its own, for those who ask for them."""
+
+    def __init__(self, net: MobileParsingRCNN) -> None:
+        super().__init__([net.dense_head.out["keypoints"]])
+
+    def forward(self, surface: Tensor) -> Tensor:
+        return channels_last(self.predicted(channels_first(surface)))
 
 
 class PhaseConv(torch.autograd.Function):
@@ -162,14 +178,17 @@ def graph_modules(net: MobileParsingRCNN, crop_net: MobileParsingRCNN | None = N
         "box_head": BoxHeadGraph(net),
         "dense_head": DenseHeadGraph(net),
     }
+    if net.config.keypoints:
+        modules[bundle.KEYPOINTS] = KeypointGraph(net)
     if crop_net is not None:
         modules |= {"crop_trunk": CropTrunk(crop_net), "crop_dense_head": DenseHeadGraph(crop_net)}
     return modules
 
 
 def export_graphs(net: MobileParsingRCNN, folder: Path, crop_net: MobileParsingRCNN | None = None) -> None:
-    """Writes the graphs of `bundle.GRAPHS` (opset 17, batch normalisation folded) and the chart weights; with the
-    network of the crop pass those of `bundle.CROP_GRAPHS` and its chart weights, too."""
+    """Writes the graphs of `bundle.GRAPHS` (opset 17, batch normalisation folded), of keypoints where the network has
+    them, and the chart weights; with the network of the crop pass those of `bundle.CROP_GRAPHS` and its chart weights.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     simple = simplified(net)
     chart_weights(simple).astype("<f4").tofile(folder / bundle.CHARTS)
@@ -223,6 +242,8 @@ def parity(
 
     def compare_dense_head(graph: str, head: DenseHead, rois: Tensor, charts: str) -> None:
         *_, surface = compare(graph, channels_last(rois))
+        if graph == "dense_head" and net.config.keypoints:
+            compare(bundle.KEYPOINTS, surface)
         found = chart_maps(surface, *read_charts(folder / charts, net.config.index_classes - 1))
         for name, maps, actual in zip("uv", head(rois)[2:], found, strict=True):
             note(f"{graph}.{name}", maps[:, 1:], actual[:, 1:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from export.bundle import read_manifest
-from export.densepose.bundle import decode_config
+from export.densepose.bundle import KEYPOINTS, decode_config
 from export.densepose.config import DecodeConfig, NetworkConfig
 from export.densepose.crop_pass import CropGraphs
 from export.densepose.decode import DenseHead, Graphs
@@ -30,7 +31,8 @@ def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
 class Bundle:
     """A bundle's graphs as callables, and the settings that its manifest names.
 
-    crop_graphs: of the crop pass; None where those of the whole image do that, too.
+    crop_graphs: of the crop pass; None where those of the whole image do that, too. surface: RoIs of the dense head ->
+    its features of the surface [P, h, w, C], which the keypoints are made of.
     """
 
     folder: Path
@@ -39,6 +41,7 @@ class Bundle:
     decode: DecodeConfig
     graphs: Graphs
     crop_graphs: CropGraphs | None
+    surface: Callable[[Tensor], Tensor]
 
 
 def open_bundle(folder: Path, threads: int = 1) -> Bundle:
@@ -88,11 +91,20 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
         # Exported for one image, as the trunk is.
         return torch.cat([run("crop_trunk", crop[None])[0].permute(0, 3, 1, 2) for crop in crops])
 
-    graphs = Graphs(detector, box_head, dense_head_of("dense_head", manifest["charts"]["file"]))
+    def surface(rois: Tensor) -> Tensor:
+        return run("dense_head", rois.permute(0, 2, 3, 1))[1]
+
+    def keypoints(rois: Tensor) -> Tensor:
+        return interleaved(run(KEYPOINTS, surface(rois))[0])
+
+    graphs = Graphs(
+        detector, box_head, dense_head_of("dense_head", manifest["charts"]["file"]),
+        keypoints if KEYPOINTS in sessions else None,
+    )  # fmt: skip
     crop_graphs = None
     if "crop_charts" in manifest:
         crop_graphs = CropGraphs(finest, dense_head_of("crop_dense_head", manifest["crop_charts"]["file"]))
-    return Bundle(folder, manifest, network, decode_config(manifest), graphs, crop_graphs)
+    return Bundle(folder, manifest, network, decode_config(manifest), graphs, crop_graphs, surface)
 
 
 def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:
@@ -103,7 +115,7 @@ def read_charts(path: Path, parts: int) -> tuple[Tensor, Tensor]:
 
 
 def interleaved(labels: Tensor) -> Tensor:
-    """The dense head's four phases [P, h, w, 4 C] as maps [P, C, 2h, 2w]."""
+    """Four phases [P, h, w, 4 C] of the dense head's labels, or of keypoints, as maps [P, C, 2h, 2w]."""
     phases = labels.unflatten(3, (2, 2, -1))  # row and column of the phase
     return phases.permute(0, 5, 1, 3, 2, 4).flatten(4, 5).flatten(2, 3)
 

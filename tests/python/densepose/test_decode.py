@@ -9,7 +9,7 @@ import torch
 
 from export.densepose import boxes as bx
 from export.densepose.config import DecodeConfig, NetworkConfig
-from export.densepose.decode import Graphs, infer, paint
+from export.densepose.decode import Graphs, infer, keypoints_of, paint
 from export.densepose.network import MobileParsingRCNN
 
 CONFIG = NetworkConfig()
@@ -199,6 +199,15 @@ def test_coordinates_are_resized_with_half_pixel_centres():
     paint([coarse, index, u, v], [0, 0, 100, 30], 1, iuv, instance, HALF)
     at = np.clip((np.arange(100) + 0.5) * 0.64 - 0.5, 0, 63)
     assert np.abs(iuv[15, :, 1] - at / 63 * 255).max() <= 0.51
+
+
+def test_a_keypoint_lies_in_the_middle_of_its_likeliest_cells():
+    logits = torch.full((1, 2, 64, 64), -20.0)
+    logits[0, 0, 10, 20] = logits[0, 0, 10, 21] = 5.0  # cells to either side of x = 21
+    logits[0, 1] = 0.0  # nowhere in particular
+    (first, second) = keypoints_of(logits, torch.tensor([[100.0, 50.0, 164.0, 178.0]]))[0]
+    torch.testing.assert_close(first, torch.tensor([121.0, 50 + 21.0, 1.0]), atol=1e-3, rtol=0)
+    assert second[2] < 0.01
 
 
 def test_an_untrained_network_runs_end_to_end():

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 def lively_network(seed):
     """An untrained network whose normalisation and fusion do something."""
     torch.manual_seed(seed)
-    net = MobileParsingRCNN(NetworkConfig(width=WIDTH, evidence=4))
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH, evidence=4, keypoints=33))
     torch.nn.init.normal_(net.evidence.out.weight)
     for module in net.modules():
         if isinstance(module, torch.nn.BatchNorm2d):
@@ -101,6 +101,8 @@ def test_heads_agree_with_torch_for_any_number_of_people(net, folder, people):
         assert_close([surface], [found])
         maps = torch.cat(net.dense_head(rois)[:2], 1)
         assert_close([maps], [graphs.interleaved(torch.from_numpy(labels)).numpy()])
+        (points,) = run(folder, "keypoints", surface)
+        assert_close([net.dense_head.with_keypoints(rois)[-1]], [graphs.interleaved(torch.from_numpy(points)).numpy()])
 
 
 def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
@@ -108,7 +110,7 @@ def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
     image, rois = torch.randn(1, 3, 96, 160), torch.randn(2, WIDTH, 32, 32)
     with torch.no_grad():
         expected, found = Graphs.of_network(net).detector(image), opened.graphs.detector(image)
-        maps = net.dense_head(rois)
+        *maps, points = net.dense_head.with_keypoints(rois)
     for tensors, arrays in zip(expected[:3], found[:3], strict=True):
         assert_close(tensors, [array.numpy() for array in arrays])
     assert_close([expected[3]], [found[3].numpy()])
@@ -117,6 +119,7 @@ def test_a_bundle_opens_as_what_decoding_works_with(net, folder):
     # The charts have no background: what the network says of it is nobody's.
     assert_close([m[:, 1:] for m in maps[2:]], [u[:, 1:].numpy(), v[:, 1:].numpy()])
     assert not u[:, 0].any()
+    assert_close([points], [opened.graphs.keypoints(rois).numpy()])
     assert opened.network.width == WIDTH
 
 
@@ -138,7 +141,7 @@ def test_crops_go_through_networks_of_their_own(net, crop_net, full_folder, fold
 def test_parity_covers_the_networks_of_crops(net, crop_net, full_folder):
     image = np.random.default_rng(0).integers(0, 255, (64, 96, 3), np.uint8)
     errors = export_onnx.parity(net, full_folder, [image], crop_net)
-    assert len(errors) == 16 + 1 + 4
+    assert len(errors) == 16 + 1 + 1 + 4
     assert max(errors.values()) <= export_onnx.TOLERANCE
     mistaken = export_onnx.parity(net, full_folder, [image], net)
     assert mistaken["crop_trunk.p2"] > export_onnx.TOLERANCE
@@ -148,7 +151,7 @@ def test_parity_covers_the_networks_of_crops(net, crop_net, full_folder):
 def test_parity_on_images_is_measured_for_every_output(net, folder):
     image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
     errors = export_onnx.parity(net, folder, [image])
-    assert len(errors) == 6 + 1 + 4 + 1 + 4
+    assert len(errors) == 6 + 1 + 4 + 1 + 1 + 4
     assert max(errors.values()) <= export_onnx.TOLERANCE
 
 
@@ -162,7 +165,7 @@ def test_parity_notices_other_weights(net, folder):
 
 
 def test_no_batch_normalisation_is_left(full_folder):
-    for name in bundle.GRAPHS + bundle.CROP_GRAPHS:
+    for name in (*bundle.GRAPHS, bundle.KEYPOINTS, *bundle.CROP_GRAPHS):
         kinds = [node.op_type for node in onnx.load(full_folder / f"{name}.onnx").graph.node]
         assert not set(kinds) & {"BatchNormalization", "Identity", "Expand", "Resize", "ConvTranspose", "Pad"}
         assert kinds.count("Shape") == {"trunk": 4, "crop_trunk": 3}.get(name, 0)  # of what is made twice as large
@@ -170,7 +173,7 @@ def test_no_batch_normalisation_is_left(full_folder):
 
 @pytest.mark.parametrize("kind", ["folder", "full_folder"])
 def test_manifest_signs_the_files_and_lists_their_tensors(kind, request):
-    folder, graph_names = request.getfixturevalue(kind), bundle.GRAPHS
+    folder, graph_names = request.getfixturevalue(kind), (*bundle.GRAPHS, bundle.KEYPOINTS)
     manifest = json.loads((folder / "manifest.json").read_text())
     others = {manifest["surface"]["file"], manifest["charts"]["file"]}
     if kind == "full_folder":
@@ -195,7 +198,7 @@ def test_manifest_signs_the_files_and_lists_their_tensors(kind, request):
 
 def test_weights_of_a_pack_of_photographs_name_its_sources_and_bring_its_credits(net, tmp_path, monkeypatch, capsys):
     write_shard(tmp_path / "val", 1)
-    config = {"width": WIDTH, "backbone": net.config.backbone, "evidence": net.config.evidence}
+    config = {name: getattr(net.config, name) for name in ("width", "backbone", "evidence", "keypoints")}
     torch.save({"ema": net.state_dict(), **config}, tmp_path / "weights.pt")
     (tmp_path / "credits.tsv").write_text("id\tlicence\tsource\tcredit\na\tCC-BY-4.0\tsome/book@12\tA. Author\n")
     given = [
@@ -220,11 +223,11 @@ def test_weights_of_a_pack_of_photographs_name_its_sources_and_bring_its_credits
 
 
 def test_a_manifest_is_refused_for_graphs_with_other_names(folder, tmp_path):
-    for name in bundle.GRAPHS:
+    for name in (*bundle.GRAPHS, bundle.KEYPOINTS):
         model = onnx.load(folder / f"{name}.onnx")
         if name == "box_head":
             model.graph.output[0].name = "scores"
         onnx.save(model, tmp_path / f"{name}.onnx")
     info = BundleInfo("tiny", "fp32")
     with pytest.raises(ValueError, match="scores"):
-        bundle.write_manifest(tmp_path, info, NetworkConfig(width=WIDTH, evidence=4), DecodeConfig())
+        bundle.write_manifest(tmp_path, info, NetworkConfig(width=WIDTH, evidence=4, keypoints=33), DecodeConfig())

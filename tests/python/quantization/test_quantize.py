@@ -28,7 +28,7 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 def folder(tmp_path_factory):
     torch.manual_seed(0)
     folder = tmp_path_factory.mktemp("bundle")
-    net = MobileParsingRCNN(NetworkConfig(width=WIDTH)).train()
+    net = MobileParsingRCNN(NetworkConfig(width=WIDTH, keypoints=33)).train()
     for norm in (m for m in net.modules() if isinstance(m, torch.nn.BatchNorm2d)):
         norm.momentum = None  # one pass sets the statistics, so that activations do not fade from layer to layer
     with torch.no_grad():
@@ -100,7 +100,7 @@ def test_no_person_to_calibrate_with_is_an_error(folder, tmp_path):
 
 def test_the_shipped_settings_name_every_graph():
     settings = read_settings(DENSEPOSE, DensePoseSettings)
-    assert set(settings.graphs) == {*bundle.GRAPHS, "crop_trunk", "crop_dense_head"}
+    assert set(settings.graphs) == {*bundle.GRAPHS, bundle.KEYPOINTS, *bundle.CROP_GRAPHS}
 
 
 @pytest.mark.parametrize("text", ["[trunk]\nmethod = 'magic'", "[trunk]\nbits = 4", "images = 3"])

@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from export import data_sources as sources
-from export import keypoints
 from export.bundle import BundleInfo, Signature
 from export.bundle import write_manifest as write_bundle_manifest
 from export.densepose.config import DecodeConfig, NetworkConfig
@@ -120,7 +119,7 @@ def write_manifest(
             "mask_threshold": decode.mask_threshold,
             "min_visible_fraction": decode.min_visible_fraction,
         },
-        **({KEYPOINTS: {"names": [name.replace(" ", "_") for name in keypoints.NAMES]}} if network.keypoints else {}),
+        **({KEYPOINTS: {"count": network.keypoints}} if network.keypoints else {}),
         "charts": {"file": CHARTS},
         "surface": {"file": SURFACE_GRID},
     }

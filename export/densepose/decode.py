@@ -17,6 +17,7 @@ from torch import Tensor
 from torch.nn import functional as F
 from torchvision.ops import nms
 
+from export import keypoints
 from export.densepose import boxes as bx
 from export.densepose import targets as tg
 from export.densepose.config import DecodeConfig, NetworkConfig
@@ -142,6 +143,8 @@ def infer(
         if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
     keypoint = None
+    if graphs.keypoints is not None:
+        keypoint = np.zeros((0, keypoints.COUNT, 3), np.float32)
     if points is not None:
         keypoint = keypoints_of(points[painted], regions[painted] * to_image).numpy()
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance, keypoint)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from export.bundle import MANIFEST, read_manifest
+from export.keypoints import COUNT
 
 if TYPE_CHECKING:
     from maquette import DensePoseResult
@@ -36,13 +37,14 @@ DEFAULT_PATHS = {
 class Prediction:
     """box: float32 [n, 4] x0, y0, x1, y1; score: float32 [n], best first. iuv: uint8 [H, W, 3] holding I,
     U*255, V*255, all people in one image, better scores in front. inds: uint8 [H, W], k for box k - 1, 0
-    for nobody.
+    for nobody. keypoint: float32 [n, 33, 3] x, y and confidence (`export.keypoints`); None where the backend has none.
     """
 
     box: np.ndarray
     score: np.ndarray
     iuv: np.ndarray
     inds: np.ndarray
+    keypoint: np.ndarray | None = None
 
     def above(self, threshold: float) -> Prediction:
         """The people with at least this score. As better scores are in front, this is what a run with the
@@ -54,6 +56,7 @@ class Prediction:
             self.score[:count],
             self.iuv * shown[..., None].astype(np.uint8),
             self.inds * shown.astype(np.uint8),
+            None if self.keypoint is None else self.keypoint[:count],
         )
 
 
@@ -94,7 +97,7 @@ class TorchBackend:
         from export.densepose.decode import infer
 
         result = infer(self._graphs, image, self._network, self._decode)
-        return Prediction(result.boxes, result.scores, result.iuv, result.instance)
+        return Prediction(result.boxes, result.scores, result.iuv, result.instance, result.keypoint)
 
 
 class OnnxBackend:
@@ -119,7 +122,7 @@ class OnnxBackend:
         from export.densepose.decode import infer
 
         result = infer(self._bundle.graphs, image, self._bundle.network, self._decode)
-        return Prediction(result.boxes, result.scores, result.iuv, result.instance)
+        return Prediction(result.boxes, result.scores, result.iuv, result.instance, result.keypoint)
 
 
 class CApiBackend:
@@ -137,19 +140,23 @@ class CApiBackend:
         if settings:  # tables name columns by the kind
             self.kind = "capi?" + "&".join(f"{name}={value}" for name, value in settings.items())
         roll_deg = settings.pop("roll_deg", 0)
+        self._has_keypoints = bool(settings.get("has_keypoints", 0))
         self._densepose = DensePose(path, score_threshold=score_floor, **settings)
         if roll_deg:
             self._densepose.set_roll(np.radians(roll_deg))
 
     def predict(self, image: np.ndarray) -> Prediction:
-        return prediction_of(self._densepose.run(image))
+        return prediction_of(self._densepose.run(image), self._has_keypoints)
 
 
-def prediction_of(result: DensePoseResult) -> Prediction:
-    """The result of libmaquette in the form that all backends share."""
+def prediction_of(result: DensePoseResult, has_keypoints: bool = False) -> Prediction:
+    """The result of libmaquette in the form that all backends share. has_keypoints: the result has them."""
     box = np.array([person.box_px for person in result.people], np.float32).reshape(-1, 4)
     score = np.array([person.score for person in result.people], np.float32)
-    return Prediction(box, score, np.stack([result.part, result.u, result.v], -1), result.person)
+    keypoint = None
+    if has_keypoints:
+        keypoint = np.array([person.keypoints for person in result.people], np.float32).reshape(-1, COUNT, 3)
+    return Prediction(box, score, np.stack([result.part, result.u, result.v], -1), result.person, keypoint)
 
 
 def open_backend(text: str, score_floor: float) -> Backend:

@@ -22,6 +22,7 @@ from export.evaluation.breakdown import GroupMetrics, breakdown, left_right, mea
 from export.evaluation.calibration import Calibration, calibrate
 from export.evaluation.failures import Case, worst_cases
 from export.evaluation.json_values import plain
+from export.evaluation.keypoints import KeypointMetrics, KeypointTally
 from export.evaluation.machine import describe_machine
 from export.evaluation.people import (
     LONG_SIDE_PX,
@@ -69,6 +70,8 @@ metrics:
   left/right               of the landmarks of limbs with a limb painted, those with the right side
   chest or back            of people with a torso painted whose shoulders show which way they face, those with more
                            of the right side of it
+  keypoints                of the visible landmarks of people who show their torso, those with a keypoint closer than 0.1
+                           torsos; and of limbs' keypoints near a landmark or its mirror, those nearer to the landmark
   false people             shown per photo without people; per photo of animals
 
 example:
@@ -100,7 +103,7 @@ class PhotoSet:
 @dataclass(frozen=True)
 class PhotoMetrics:
     """Fractions 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: fraction right by
-    landmark name. groups, failures: as for rendered images, with landmarks in place of pixels."""
+    landmark name. keypoints: None where the backend has none. groups, failures: as for rendered images, with landmarks in place of pixels."""
 
     photos: int
     people: int
@@ -117,6 +120,7 @@ class PhotoMetrics:
     animal_photos: int
     false_people_by_animals: float
     landmark: dict[str, float]
+    keypoints: KeypointMetrics | None
     calibration: Calibration
     groups: list[GroupMetrics]
     failures: dict[str, list[Case]]
@@ -134,6 +138,7 @@ class Tally:
         self.by_animals: list[FalseAlarm] = []
         self.landmarks: dict[str, list[bool]] = {name: [] for name in _ALLOWED}
         self.facing: list[bool] = []  # of each person whose chest or back is painted, whether it is the right one
+        self.keypoints: KeypointTally | None = None
         self.photos = self.empty = self.animals = 0
 
     def add(self, name: str, found: Prediction, labels: PhotoLabels) -> None:
@@ -145,10 +150,17 @@ class Tally:
         self.alarms += comparison.false_alarms(name)
         height, width = found.inds.shape
         close = crowding(labels.box)
+        if found.keypoint is not None and self.keypoints is None:
+            self.keypoints = KeypointTally()
         for k, number in zip(np.flatnonzero(wanted), comparison.number.tolist(), strict=True):
             painted = (comparison.shown.inds == number) & (number > 0)
             part = np.where(painted, comparison.shown.iuv[..., 0], 0)
             asked, right, limb, same_side = self._landmarks(part, labels, k) if labels.sure[k] else (0, 0, 0, 0)
+            if self.keypoints is not None and labels.sure[k]:
+                own = (
+                    comparison.shown.keypoint[number - 1] if number and comparison.shown.keypoint is not None else None
+                )
+                self.keypoints.add(own, labels.point[k], labels.visible[k])
             side = shown_side(labels, int(k))
             torso = [int((part == value).sum()) for value in (BACK, CHEST)]
             if side and sum(torso) >= MIN_TORSO_PIXELS:
@@ -217,6 +229,7 @@ class Tally:
             animal_photos=self.animals,
             false_people_by_animals=fraction(len(self.by_animals), self.animals),
             landmark={name: fraction(sum(hits), len(hits)) for name, hits in self.landmarks.items()},
+            keypoints=None if self.keypoints is None else self.keypoints.metrics(),
             calibration=calibrate(self.matches),
             groups=breakdown(self.people),
             failures=worst_cases(self.people, self.alarms + self.in_empty + self.by_animals, MIN_LIMB_LANDMARKS),
@@ -335,6 +348,13 @@ def print_metrics(name: str, metrics: PhotoMetrics) -> None:
         (f"false people a photo of animals ({metrics.animal_photos} photos)", metrics.false_people_by_animals),
         *metrics.landmark.items(),
     ]
+    if metrics.keypoints is not None:
+        points = metrics.keypoints
+        rows += [
+            (f"keypoints within 0.1 torsos ({points.people} people)", points.pck),
+            ("left/right of keypoints", points.left_right),
+            *((f"keypoint: {name}", value) for name, value in points.by_name.items()),
+        ]
     for label, value in rows:
         values = value if isinstance(value, tuple) else (value,)
         table.add_row(label, ", ".join("-" if np.isnan(v) else f"{v:.2f}" for v in values))

@@ -10,7 +10,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from maquette.densepose import DensePose, DensePoseResult, Person, part_colours, part_name
+from maquette.densepose import (
+    COCO_KEYPOINTS,
+    KEYPOINTS,
+    DensePose,
+    DensePoseResult,
+    Person,
+    part_colours,
+    part_name,
+)
 from maquette.edges import Box, Curve, Curves, Edges, EdgesResult
 from maquette.frames import Frame, Intrinsics, Origin, PixelFormat
 from maquette.fusion import EdgesFusion
@@ -51,6 +59,7 @@ from maquette.sources import (
 )
 
 __all__ = [
+    "COCO_KEYPOINTS", "KEYPOINTS",
     "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
     "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
     "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",

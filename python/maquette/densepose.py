@@ -18,18 +18,30 @@ if TYPE_CHECKING:
     from maquette.settings import DensePoseSettings, PartColours
 
 PART_COUNT = 24
+# Names of a person's keypoints, as MediaPipe Pose orders them. "Left" is the person's left.
+KEYPOINTS = (
+    "nose", "left_eye_inner", "left_eye", "left_eye_outer", "right_eye_inner", "right_eye", "right_eye_outer",
+    "left_ear", "right_ear", "mouth_left", "mouth_right", "left_shoulder", "right_shoulder", "left_elbow",
+    "right_elbow", "left_wrist", "right_wrist", "left_pinky", "right_pinky", "left_index", "right_index", "left_thumb",
+    "right_thumb", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel",
+    "right_heel", "left_foot_index", "right_foot_index",
+)  # fmt: skip
+# Of the keypoints, those of COCO, in its order: people's `keypoints[COCO_KEYPOINTS]` is [17, 3].
+COCO_KEYPOINTS = [0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]
 
 
 @dataclass(frozen=True)
 class Person:
     """box_px: left, top, right, bottom in pixels of the image, the latter two exclusive. score: 0 to 1. head_box_px:
     around the pixels that show the head, for `HeadBuilder.add_photo`; None where none does. id: from 1; in a
-    stream (frames of a `Source`) the same for one person while seen."""
+    stream (frames of a `Source`) the same for one person while seen. keypoints: float32 [33, 3], x and y in pixels of
+    the image and a confidence of 0 to 1, in the order of `KEYPOINTS`; None unless `DensePose(has_keypoints=True)`."""
 
     box_px: tuple[float, float, float, float]
     score: float
     head_box_px: tuple[float, float, float, float] | None
     id: int
+    keypoints: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +166,10 @@ def densepose_result(result: Any, lent: LentResult) -> DensePoseResult:
     shape = size[1][0], size[0][0]
     count = n.lib.maq_densepose_result_get_person_count(result)
     found = n.indexed("maq_densepose_result_get_person", result, "maq_densepose_person", count)
-    people = [Person(tuple(p.box_px), p.score, _head_box_px(result, index), p.id) for index, p in enumerate(found)]
+    people = [
+        Person(tuple(p.box_px), p.score, _head_box_px(result, index), p.id, _keypoints(result, index))
+        for index, p in enumerate(found)
+    ]
     part, u, v, person = (
         n.plane("maq_densepose_result_get_plane", result, plane, shape, np.uint8)
         for plane in (
@@ -186,6 +201,17 @@ def _head_box_px(result: Any, index: int) -> tuple[float, float, float, float] |
         n.fail("maq_densepose_result_get_head_box", status)
     left, top, right, bottom = box_px
     return left, top, right, bottom
+
+
+def _keypoints(result: Any, index: int) -> np.ndarray | None:
+    n = native()
+    keypoints = np.empty((len(KEYPOINTS), 3), np.float32)
+    status = n.ask("maq_densepose_result_get_keypoints", result, index, n.ffi.from_buffer("float[]", keypoints))
+    if status == n.lib.MAQ_ERROR_NOT_FOUND:
+        return None
+    if status:
+        n.fail("maq_densepose_result_get_keypoints", status)
+    return keypoints
 
 
 def part_name(part: int) -> str:

@@ -110,6 +110,10 @@ class DensePoseSettings(ModelSettings, total=False):
     result_pool_size: int
     """Results the app may hold at once, 1 to 64; 0 (default): 4."""
 
+    has_keypoints: int
+    """1: keypoints of each person are found (maq_densepose_result_get_keypoints), for about a millisecond a person; 0
+    (default): they are not."""
+
 
 class EdgesSettings(ModelSettings, total=False):
     """Fields of maq_edges_config."""

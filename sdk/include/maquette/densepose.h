@@ -63,6 +63,8 @@ typedef struct maq_densepose_config {
   maq_densepose_crops person_crops; /* default MAQ_DENSEPOSE_CROPS_DEFAULT */
   int32_t person_crop_px;           /* side of a crop, 64 to 512; 0 (default): 192, of photos 256. Smaller is faster. */
   uint32_t result_pool_size;        /* results the app may hold at once, 1 to 64; 0 (default): 4 */
+  int32_t has_keypoints;            /* 1: keypoints of each person are found (maq_densepose_result_get_keypoints), for
+                                       about a millisecond a person; 0 (default): they are not */
 } maq_densepose_config;
 
 typedef struct maq_densepose_person {
@@ -72,6 +74,49 @@ typedef struct maq_densepose_person {
   int64_t id;      /* 1 or more. In a stream, a person keeps the id while seen and for a second after; new people get
                       new ids. A frame with `sequence` 0 begins a stream. */
 } maq_densepose_person;
+
+/* Keypoints of a person: MediaPipe Pose's 33, in its order. "Left" is the person's left. */
+typedef enum maq_densepose_keypoint {
+  MAQ_DENSEPOSE_KEYPOINT_NOSE = 0,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE_INNER = 1,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE = 2,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE_OUTER = 3,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE_INNER = 4,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE = 5,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE_OUTER = 6,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_EAR = 7,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_EAR = 8,
+  MAQ_DENSEPOSE_KEYPOINT_MOUTH_LEFT = 9,
+  MAQ_DENSEPOSE_KEYPOINT_MOUTH_RIGHT = 10,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER = 11,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER = 12,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_ELBOW = 13,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_ELBOW = 14,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST = 15,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST = 16,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_PINKY = 17, /* knuckles of the hand */
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_PINKY = 18,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_INDEX = 19,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_INDEX = 20,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_THUMB = 21,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_THUMB = 22,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP = 23,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP = 24,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_KNEE = 25,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_KNEE = 26,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_ANKLE = 27,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_ANKLE = 28,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_HEEL = 29,
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_HEEL = 30,
+  MAQ_DENSEPOSE_KEYPOINT_LEFT_FOOT_INDEX = 31, /* the big toe */
+  MAQ_DENSEPOSE_KEYPOINT_RIGHT_FOOT_INDEX = 32
+} maq_densepose_keypoint;
+
+#define MAQ_DENSEPOSE_KEYPOINT_COUNT 33
+
+/* Returns the name of a keypoint ("left_wrist"), or "unknown" for numbers outside 0 to 32. The text is static.
+ * Any thread. Does not fail or block. */
+MAQ_API const char* maq_densepose_get_keypoint_name(int32_t keypoint);
 
 /* The planes of a result: one byte a pixel of the frame. */
 typedef enum maq_densepose_plane {
@@ -112,6 +157,7 @@ typedef struct maq_densepose_stats {
   maq_provider provider;       /* provider in use for the trunk */
   int32_t threads;             /* threads of the networks; fewer if the system starts no more (see the log) */
   int32_t is_threads_measured; /* 1: MAQ_THREADS_MEASURED chose the number of threads */
+  float keypoints_ms;          /* network of keypoints, and their places */
 } maq_densepose_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_densepose_config) of the caller.
@@ -178,6 +224,14 @@ MAQ_API maq_status maq_densepose_result_get_person(const maq_densepose_result* r
  * Does not block. */
 MAQ_API maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result, uint32_t index,
                                                      float box_px[4]);
+
+/* Gets the keypoints of a person: x and y in pixels of the frame, and a confidence of 0 to 1, of each keypoint in the
+ * order of maq_densepose_keypoint (99 numbers). The confidence is the probability that the keypoint lies within about 4
+ * % of the person's box of there. It is low for keypoints that the frame does not show; below 0.3 the place means
+ * little. Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (has_keypoints was
+ * 0). Does not block. */
+MAQ_API maq_status maq_densepose_result_get_keypoints(const maq_densepose_result* result, uint32_t index,
+                                                      float keypoints[99]);
 
 /* Gets a plane: height_px rows of `*stride_bytes` bytes (maq_densepose_result_get_size). The pixels are inside the
  * result and valid until it is released. Neither pointer may be NULL. If people overlap, the person with the better

@@ -59,6 +59,13 @@ class DensePoseResult {
     return box_px;
   }
 
+  // Indexed by maq_densepose_keypoint: x and y in pixels of the frame, and the confidence.
+  std::array<std::array<float, 3>, MAQ_DENSEPOSE_KEYPOINT_COUNT> keypoints(uint32_t index) const {
+    std::array<std::array<float, 3>, MAQ_DENSEPOSE_KEYPOINT_COUNT> found{};
+    check(maq_densepose_result_get_keypoints(get(), index, found[0].data()));
+    return found;
+  }
+
   // height_px() rows of *stride_bytes.
   const uint8_t* plane(maq_densepose_plane plane, size_t* stride_bytes) const {
     const uint8_t* pixels = nullptr;

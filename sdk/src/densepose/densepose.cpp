@@ -82,6 +82,7 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
   const int channels = detector_->trunk().channels();
   mapper_ = std::make_unique<SurfaceMapper>(networks, spec_, "dense_head", spec_.charts_file, channels);
   crops_ = std::make_unique<CropPass>(networks, spec_, settings_, detector_->trunk(), *mapper_);
+  if (settings_.keypoints) keypoints_ = std::make_unique<KeypointFinder>(networks, spec_, mapper_->chart_channels());
   if (spec_.dense_head.output_size != 2 * spec_.dense_head.pool_size) {
     throw Error(MAQ_ERROR_BAD_BUNDLE, "Bundle ", bundle.manifest.name, ": the dense head's output is ",
                 spec_.dense_head.output_size, " cells wide, but must be twice its pool of ", spec_.dense_head.pool_size,
@@ -156,6 +157,7 @@ void DensePose::map_image(const ImageView& image, DensePoseResult& result) {
   DensePoseStats& stats = result.stats;
   stats = {};
   result.people.clear();
+  result.keypoints.clear();
   result.planes.reset(image.width_px, image.height_px);
   begin_frame(image, stats);
 
@@ -177,6 +179,7 @@ void DensePose::map_image(const ImageView& image, DensePoseResult& result) {
     if (!mapped_.empty()) map_people(image, stats);
   }
   paint_people(result);
+  find_keypoints(result);
   give_ids(image, result);
   stats.total_ms = float(total.lap_ms());
 }
@@ -328,6 +331,7 @@ void DensePose::paint_people(DensePoseResult& result) {
   const bool ran_crops_alone = !result.stats.key_frame && tracks_crops_;
   tracked_.clear();
   tracks_crops_ = false;
+  if (keypoints_ != nullptr) keypoints_->begin();
   if (mapped_.empty()) return;
   tracks_crops_ = settings_.key_frame_interval > 1 &&
                   std::all_of(mapped_.begin(), mapped_.end(), [](const MappedPerson& p) { return p.crop.has_value(); });
@@ -355,6 +359,7 @@ void DensePose::paint_people(DensePoseResult& result) {
       clip_box(body, float(result.planes.width_px), float(result.planes.height_px));
       person.box = person.first_view ? body : between(person.box, body);
     }
+    if (keypoints_ != nullptr) keypoints_->add(person.answer.surface, to_cells.inverse());
     const bool is_lost = double(counts.body_pixels) < kMinKeptBody * double(person.body_pixels);
     person.body_pixels = counts.body_pixels;
     if (is_stream_ && person.crop) {
@@ -364,6 +369,14 @@ void DensePose::paint_people(DensePoseResult& result) {
     if (!(tracks_crops_ && is_lost)) tracked_.push_back(person);
   }
   result.stats.decode_ms = float(stage.lap_ms());
+}
+
+void DensePose::find_keypoints(DensePoseResult& result) {
+  if (keypoints_ == nullptr || result.people.empty()) return;
+  Stopwatch stage;
+  const TraceSection trace("maquette keypoints");
+  result.keypoints = keypoints_->run(*cancel_);
+  result.stats.keypoints_ms = float(stage.lap_ms());
 }
 
 void DensePose::give_ids(const ImageView& image, DensePoseResult& result) {

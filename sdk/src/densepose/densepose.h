@@ -13,6 +13,7 @@
 #include "densepose/detector/input_scales.h"
 #include "densepose/detector/person_detector.h"
 #include "densepose/frame_budget.h"
+#include "densepose/keypoints/keypoint_finder.h"
 #include "densepose/surface/dense_decode.h"
 #include "densepose/surface/steady_labels.h"
 #include "densepose/surface/surface_grid.h"
@@ -33,6 +34,7 @@ struct DensePoseStats : DetectorStats {
   float dense_head_ms = 0;
   float crops_ms = 0;
   float decode_ms = 0;
+  float keypoints_ms = 0;
   float total_ms = 0;
   int network_width_px = 0;
   int network_height_px = 0;
@@ -46,6 +48,7 @@ struct DensePoseStats : DetectorStats {
 struct DensePoseResult {
   std::vector<Person> people;  // best score first; each has at least one pixel of `planes`
   DensePlanes planes;
+  std::vector<Keypoints> keypoints;  // of each person, if the settings ask for them; otherwise empty
   DensePoseStats stats;
 };
 
@@ -115,8 +118,10 @@ class DensePose {
   void map_people(const ImageView& image, DensePoseStats& stats);
   void drop_unlikely();
   void sort_by_score();  // `mapped_`, best first
-  // Paints `mapped_`. Adds the people who got a pixel to `result`, and to `tracked_` for the next frame.
+  // Paints `mapped_`. Adds the people who got a pixel to `result`, to `tracked_` for the next frame, and to
+  // `keypoints_`.
   void paint_people(DensePoseResult& result);
+  void find_keypoints(DensePoseResult& result);
   void give_ids(const ImageView& image, DensePoseResult& result);
 
   DensePoseSpec spec_;
@@ -129,6 +134,7 @@ class DensePose {
   std::unique_ptr<PersonDetector> detector_;
   std::unique_ptr<SurfaceMapper> mapper_;
   std::unique_ptr<CropPass> crops_;
+  std::unique_ptr<KeypointFinder> keypoints_;  // if the settings ask for them
   BodySurface surface_;
   std::atomic<float> roll_rad_{0};
   int roll_steps_ = 0;

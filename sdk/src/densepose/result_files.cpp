@@ -17,12 +17,22 @@ std::string json_of(const DensePoseResult& result) {
   JsonText json;
   json.begin_object().member("width", result.planes.width_px).member("height", result.planes.height_px);
   json.key("people").begin_list();
-  for (const Person& person : result.people) {
+  for (size_t i = 0; i < result.people.size(); ++i) {
+    const Person& person = result.people[i];
     json.begin_object().key("box").begin_list();
     for (const float edge : {person.box.x0, person.box.y0, person.box.x1, person.box.y1}) {
       json.value(rounded(double(edge), 100));
     }
-    json.end_list().member("score", rounded(double(person.score), 10000)).member("id", person.id).end_object();
+    json.end_list().member("score", rounded(double(person.score), 10000)).member("id", person.id);
+    if (!result.keypoints.empty()) {
+      json.key("keypoints").begin_list();
+      for (const Keypoint& keypoint : result.keypoints[i]) {
+        json.begin_list().value(rounded(double(keypoint.x_px), 100)).value(rounded(double(keypoint.y_px), 100));
+        json.value(rounded(double(keypoint.confidence), 10000)).end_list();
+      }
+      json.end_list();
+    }
+    json.end_object();
   }
   return json.end_list().end_object().text() + "\n";
 }

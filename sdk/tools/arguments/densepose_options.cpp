@@ -39,6 +39,8 @@ void add_model_options(CLI::App& command, ModelOptions& options) {
       ->check(CLI::IsMember({"off", "auto", "all"}));
   command.add_option("--crop-size", options.crop_px, "Side of a crop in pixels (default 192, of photos 256)")
       ->check(CLI::Range(64, 512));
+  command.add_flag("--keypoints", options.keypoints,
+                   "Also find 33 keypoints of each person, as MediaPipe Pose has them");
   command.add_flag("--no-surface", options.no_surface, "Compute only body parts: faster; U and V stay 0");
 }
 
@@ -61,6 +63,7 @@ maq_densepose_config config_of(const ModelOptions& options, const std::string& b
                         : options.crops == "off" ? MAQ_DENSEPOSE_CROPS_OFF
                                                  : MAQ_DENSEPOSE_CROPS_DEFAULT;
   config.person_crop_px = options.crop_px;
+  config.has_keypoints = options.keypoints ? 1 : 0;
   config.model.provider = provider_of(options);
   return config;
 }

@@ -13,6 +13,7 @@ struct ModelOptions : NetworkOptions {
   std::string crops;   // empty: the preset's
   int crop_px = 0;
   bool no_surface = false;
+  bool keypoints = false;
 };
 
 void add_model_options(CLI::App& command, ModelOptions& options);

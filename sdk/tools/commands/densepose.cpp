@@ -37,8 +37,9 @@ struct DensePoseOptions {
 class Timings {
  public:
   void add(const maq_densepose_stats& stats) {
-    const float values[] = {stats.preprocess_ms, stats.trunk_ms, stats.proposals_ms, stats.box_head_ms,
-                            stats.dense_head_ms, stats.crops_ms, stats.decode_ms,    stats.total_ms};
+    const float values[] = {stats.preprocess_ms, stats.trunk_ms,      stats.proposals_ms,
+                            stats.box_head_ms,   stats.dense_head_ms, stats.crops_ms,
+                            stats.decode_ms,     stats.keypoints_ms,  stats.total_ms};
     for (size_t i = 0; i < kStages; ++i) ms_[i].push_back(values[i]);
     people_ += stats.person_count;
   }
@@ -51,7 +52,8 @@ class Timings {
     print_output("%zu frame%s, %lld %s. Median of a frame: %.1f ms (%.1f FPS)\n", frames(), frames() == 1 ? "" : "s",
                  (long long)people_, people_ == 1 ? "person" : "people", double(median_total_ms()),
                  1000.0 / std::max(1e-3, double(median_total_ms())));
-    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head", "dense head", "crops", "decode"};
+    constexpr const char* kNames[] = {"preprocess", "trunk", "proposals", "box head",
+                                      "dense head", "crops", "decode",    "keypoints"};
     for (size_t i = 0; i + 1 < kStages; ++i) {
       print_output("%s%s %.1f", i == 0 ? "  " : " | ", kNames[i], double(median(ms_[i])));
     }
@@ -59,7 +61,7 @@ class Timings {
   }
 
  private:
-  static constexpr size_t kStages = 8;
+  static constexpr size_t kStages = 9;
 
   static float median(std::vector<float> values) {
     if (values.empty()) return 0;
@@ -93,6 +95,7 @@ void print_frame(const DensePoseOptions& options, const std::string& stem, const
                                            {"dense_head", rounded_ms(double(stats.dense_head_ms))},
                                            {"crops", rounded_ms(double(stats.crops_ms))},
                                            {"decode", rounded_ms(double(stats.decode_ms))},
+                                           {"keypoints", rounded_ms(double(stats.keypoints_ms))},
                                            {"total", rounded_ms(double(stats.total_ms))}}}};
     print_output("%s\n", json_text(line).c_str());
     flush_output();  // for who reads line by line
@@ -115,7 +118,7 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
     // Drawn before the first file is written, so that a frame has all its files or none.
     Canvas overlay;
     if (options.overlay && options.colours == "default") {
-      overlay = draw_overlay(image_of(given.frame), result);
+      overlay = draw_overlay(image_of(given.frame), result, options.model.keypoints);
     } else if (options.overlay) {
       overlay = draw_parts(result, options.colours == "detectron2" ? MAQ_DENSEPOSE_COLOURS_DETECTRON2
                                                                    : MAQ_DENSEPOSE_COLOURS_MAGICANIMATE);
@@ -196,11 +199,12 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "Writes for each image, in the DensePose convention:\n"
       "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
       "  <stem>_INDS.png  index of the person a pixel belongs to, from 1; 0: background\n"
-      "  <stem>.json      boxes in pixels and scores\n"
+      "  <stem>.json      boxes in pixels, scores, ids; with --keypoints also keypoints: x, y, confidence\n"
       "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"
       "  maquette densepose holiday/*.jpg --out results --preset stream\n"
+      "  maquette densepose photo.jpg --out results --overlay --keypoints\n"
       "  maquette densepose lying_phone.jpg --out results --roll 90\n"
       "  maquette densepose 'video:dance.mp4?fps=10' --out results --overlay\n"
       "  maquette densepose 'stub:people?count=3&seed=7' --out results --overlay --max-frames 60");

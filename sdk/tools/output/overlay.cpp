@@ -173,6 +173,63 @@ void draw_box(const maq_densepose_person& person, int scale, Canvas& canvas) {
   canvas.text(text, left + pad, top + pad, thickness, kInk);
 }
 
+struct Bone {
+  maq_densepose_keypoint from, to;
+};
+
+constexpr Bone kBones[] = {
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP, MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_LEFT_ELBOW},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_ELBOW},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_ELBOW, MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_ELBOW, MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST, MAQ_DENSEPOSE_KEYPOINT_LEFT_INDEX},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST, MAQ_DENSEPOSE_KEYPOINT_RIGHT_INDEX},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST, MAQ_DENSEPOSE_KEYPOINT_LEFT_THUMB},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST, MAQ_DENSEPOSE_KEYPOINT_RIGHT_THUMB},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP, MAQ_DENSEPOSE_KEYPOINT_LEFT_KNEE},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP, MAQ_DENSEPOSE_KEYPOINT_RIGHT_KNEE},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_KNEE, MAQ_DENSEPOSE_KEYPOINT_LEFT_ANKLE},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_KNEE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_ANKLE},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_ANKLE, MAQ_DENSEPOSE_KEYPOINT_LEFT_FOOT_INDEX},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_ANKLE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_FOOT_INDEX},
+    {MAQ_DENSEPOSE_KEYPOINT_NOSE, MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE},
+    {MAQ_DENSEPOSE_KEYPOINT_NOSE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE},
+    {MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE, MAQ_DENSEPOSE_KEYPOINT_LEFT_EAR},
+    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_EAR},
+};
+
+// Lines between keypoints of enough confidence: cool to the person's left, warm to the right, as the parts.
+void draw_skeleton(const maquette::DensePoseResult& result, uint32_t person, int scale, Canvas& canvas) {
+  constexpr float kMinConfidence = 0.3f;
+  constexpr Bgr kLeft = {255, 200, 60}, kRight = {70, 120, 255}, kMiddle = {255, 255, 255};
+  const auto keypoints = result.keypoints(person);
+  const double width = std::max(2.0, std::max(canvas.width(), canvas.height()) / 350.0);
+  const auto place = [&](size_t k) {
+    return CanvasPoint{double(keypoints[k][0]) * scale - 0.5, double(keypoints[k][1]) * scale - 0.5};
+  };
+  const auto colour_of = [](size_t k) {
+    const std::string name = maq_densepose_get_keypoint_name(int32_t(k));
+    return name.find("left") != std::string::npos ? kLeft : name.find("right") != std::string::npos ? kRight : kMiddle;
+  };
+  for (const bool is_shadow : {true, false}) {
+    for (const Bone& bone : kBones) {
+      if (std::min(keypoints[bone.from][2], keypoints[bone.to][2]) < kMinConfidence) continue;
+      const bool is_across = colour_of(bone.from) != colour_of(bone.to) && bone.from != MAQ_DENSEPOSE_KEYPOINT_NOSE;
+      canvas.line(place(bone.from), place(bone.to), is_shadow ? width + 2 : width,
+                  is_shadow   ? kInk
+                  : is_across ? kMiddle
+                              : colour_of(bone.to));
+    }
+  }
+  for (size_t k = 0; k < keypoints.size(); ++k) {
+    if (keypoints[k][2] >= kMinConfidence) canvas.disc(place(k), width, colour_of(k));
+  }
+}
+
 // The smallest area with all pixels of a person, and two more on each side; none: no width.
 Area area_of(const Plane& persons, int person, PictureSide size) {
   int left = size.width, top = size.height, right = 0, bottom = 0;
@@ -193,7 +250,7 @@ Area area_of(const Plane& persons, int person, PictureSide size) {
 
 }  // namespace
 
-Canvas draw_overlay(const Canvas& image, const maquette::DensePoseResult& result) {
+Canvas draw_overlay(const Canvas& image, const maquette::DensePoseResult& result, bool has_keypoints) {
   const int scale = std::clamp(kReadableSidePx / std::max(image.width(), image.height()), 1, kLargestEnlargement);
   Canvas canvas = image.resized({image.width() * scale, image.height() * scale});
   // The people stand out from a slightly darkened image.
@@ -207,6 +264,7 @@ Canvas draw_overlay(const Canvas& image, const maquette::DensePoseResult& result
     const Area box = area_of(planes.person, int(k + 1), image.size());
     if (box.size.width > 0) paint(enlarge(planes, int(k + 1), box, scale), line_px, canvas);
   }
+  for (size_t k = people.size(); has_keypoints && k-- > 0;) draw_skeleton(result, uint32_t(k), scale, canvas);
   // The best last, so that its label is on top.
   for (size_t k = people.size(); k-- > 0;) draw_box(people[k], scale, canvas);
   return canvas;

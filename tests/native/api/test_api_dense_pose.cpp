@@ -65,6 +65,35 @@ maquette::DensePose with_threads(const maquette::Context& context, int threads) 
   return maquette::DensePose(context, config);
 }
 
+TEST(ApiDensePose, KeypointsAreReadByPersonAndOnlyWhereTheyWereAskedFor) {
+  const maquette::Context context;
+  const RedCell image;
+  maq_densepose_config config = maquette::default_densepose_config();
+  config.model.bundle_path = kBundle;
+  float flat[99];
+  {
+    maquette::DensePose densepose(context, config);
+    const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
+    EXPECT_EQ(maq_densepose_result_get_keypoints(result.get(), 0, flat), MAQ_ERROR_NOT_FOUND);
+    EXPECT_STREQ(maq_last_error(nullptr),
+                 "maq_densepose_result_get_keypoints: No keypoints were asked for; set has_keypoints in "
+                 "maq_densepose_config.");
+  }
+  config.has_keypoints = 1;
+  maquette::DensePose densepose(context, config);
+  const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
+  const auto keypoints = result.keypoints(0);
+  EXPECT_GT(keypoints[MAQ_DENSEPOSE_KEYPOINT_NOSE][0], keypoints[MAQ_DENSEPOSE_KEYPOINT_LEFT_HEEL][0]);
+  EXPECT_GT(keypoints[MAQ_DENSEPOSE_KEYPOINT_NOSE][2], 0.9f);
+  EXPECT_LT(keypoints[MAQ_DENSEPOSE_KEYPOINT_RIGHT_FOOT_INDEX][2], 0.1f);
+  EXPECT_EQ(maq_densepose_result_get_keypoints(result.get(), 1, flat), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_result_get_keypoints(result.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_densepose_result_get_keypoints(nullptr, 0, flat), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_STREQ(maq_densepose_get_keypoint_name(MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST), "left_wrist");
+  EXPECT_STREQ(maq_densepose_get_keypoint_name(MAQ_DENSEPOSE_KEYPOINT_COUNT), "unknown");
+  EXPECT_STREQ(maq_densepose_get_keypoint_name(-1), "unknown");
+}
+
 TEST(ApiDensePose, MeasuredThreadsAreAFewAndGiveTheSame) {
   const maquette::Context context;
   const RedCell image;

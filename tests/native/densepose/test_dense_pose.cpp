@@ -129,6 +129,67 @@ TEST_F(DensePose, ThePlanesOfAPersonAreTheDenseHeadsAnswer) {
   EXPECT_EQ(result.stats.decoded.clamped_uv, clamped);
 }
 
+TEST_F(DensePose, KeypointsLieInTheRegionThatTheDenseHeadSaw) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;
+  image(cv::Rect(40, 200, 4, 4)) = kRed;
+  maq::DensePoseSettings settings;
+  EXPECT_TRUE(run(image, settings).keypoints.empty()) << "nobody asked for them";
+  settings.keypoints = true;
+  const maq::DensePoseResult result = run(image, settings);
+  ASSERT_EQ(result.people.size(), 2u);
+  ASSERT_EQ(result.keypoints.size(), 2u);
+  EXPECT_GT(result.stats.keypoints_ms, 0);
+  for (size_t i = 0; i < 2; ++i) {
+    const maq::Box& box = result.people[i].box;
+    const float width = 1.06f * box.width(), height = 1.1f * box.height();  // with the margins
+    for (int k = 0; k < 32; ++k) {
+      const maq::Keypoint& keypoint = result.keypoints[i][size_t(k)];
+      EXPECT_NEAR(keypoint.x_px, box.x0 - 0.03f * box.width() + width * (63.5f - float(k)) / 64, 1e-2) << k;
+      EXPECT_NEAR(keypoint.y_px, box.y0 - 0.05f * box.height() + height * (0.5f + float(k)) / 64, 1e-2) << k;
+      EXPECT_GT(keypoint.confidence, 0.99f) << k;
+    }
+    EXPECT_LT(result.keypoints[i][32].confidence, 0.01f) << "the tiny bundle never shows it";
+  }
+  EXPECT_TRUE(run(black(320, 256), settings).keypoints.empty());
+}
+
+TEST_F(DensePose, KeypointsOfCropsAndBetweenKeyFramesAreThoseOfTheSurface) {
+  cv::Mat image = black(320, 256);
+  image(cv::Rect(160, 96, 16, 16)) = kBlue;
+  maq::DensePoseSettings settings;
+  settings.keypoints = true;
+  settings.crops = maq::PersonCrops::kAll;
+  settings.key_frame_interval = 4;
+  maq::DensePose densepose = make(settings);
+  maq::DensePoseResult result;
+  for (int frame = 0; frame < 3; ++frame) {
+    densepose.run({MAQ_PIXEL_BGR8, image.cols, image.rows, {{image.data, image.step}, {}}}, result);
+    ASSERT_EQ(result.people.size(), 1u);
+    ASSERT_EQ(result.keypoints.size(), 1u) << frame;
+    // The line of the tiny bundle's keypoints, from the upper right to the lower left of a crop.
+    EXPECT_GT(result.keypoints[0][0].x_px, result.people[0].box.x1 - 20);
+    EXPECT_LT(result.keypoints[0][0].y_px, result.people[0].box.y0 + 40);
+    EXPECT_NEAR(result.keypoints[0][16].x_px - result.keypoints[0][15].x_px,
+                result.keypoints[0][1].x_px - result.keypoints[0][0].x_px, 1e-3);
+  }
+}
+
+TEST_F(DensePose, ABundleWithoutKeypointsSaysSo) {
+  const BundleCopy bundle;
+  nlohmann::json manifest = bundle.manifest();
+  maq::DensePoseSettings settings;
+  settings.keypoints = true;
+  manifest["keypoints"]["count"] = 17;
+  bundle.write_manifest(manifest);
+  expect_error(MAQ_ERROR_BAD_BUNDLE, "has 17 keypoints, but must have 33", [&] { make(settings, bundle.path()); });
+  manifest.erase("keypoints");
+  bundle.write_manifest(manifest);
+  expect_error(MAQ_ERROR_UNSUPPORTED, "has no keypoints", [&] { make(settings, bundle.path()); });
+  settings.keypoints = false;
+  EXPECT_NO_THROW(make(settings, bundle.path()));
+}
+
 TEST_F(DensePose, ASecondPassStartsWhereTheFirstEnded) {
   cv::Mat image = black(320, 256);
   image(cv::Rect(80, 100, 4, 4)) = kRed;

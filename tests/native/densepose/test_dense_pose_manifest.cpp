@@ -73,6 +73,7 @@ TEST(DensePoseManifest, RefusesValuesOutOfRange) {
                                                 {"/box_head/score_threshold", -1},
                                                 {"/box_head/second_pass_threshold", 2},
                                                 {"/box_head/evidence_stride", 0},
+                                                {"/keypoints/count", 0},
                                                 {"/dense_head/index_classes", 1000},
                                                 {"/dense_head/mask_threshold", 1},
                                                 {"/dense_head/min_visible_fraction", 1.5},

@@ -5,6 +5,7 @@ red at a cell of P2 is a person of 32 px, green at a cell of P3 one of 64 px, bl
 each in the square anchor of that cell, shifted right by a tenth of its width (box delta 1 at weight 10).
 The dense head answers the same for everybody: the upper quarter of the box is background; of the rest the left half is
 part 3 and the right half part 7; U rises from -0.11 at the left to 1.11 at the right, V from 0 at the top to 1.
+Keypoint k is in row k and column 63 - k of the 64 x 64 cells; the last one is not shown.
 The trunk's output `person`, which the manifest does not ask for (box_head.evidence_stride), is -180 times red, in cells
 of 16 px: with it, reddish surroundings speak against a person.
 
@@ -21,7 +22,7 @@ from export.bundle import OPSET, BundleInfo, write_manifest
 
 CHANNELS = 3
 POOL, DENSE_POOL, OUTPUT = 7, 32, 64
-COARSE, INDEX, SURFACE = 15, 25, 4
+COARSE, INDEX, SURFACE, KEYPOINTS = 15, 25, 4, 33
 
 
 def tensor(name, value):
@@ -120,20 +121,34 @@ def dense_head():
     for parity in (0, 1):
         surface[0, ..., parity] = 0.61 * ramp[parity::2]
         surface[0, ..., 2 + parity] = 0.5 * ramp[parity::2, None]
-    nodes = [
-        helper.make_node("Shape", ["rois"], ["people"], start=0, end=1),
-        helper.make_node("Add", ["rows", "columns"], ["labels.value"]),
-    ]
+    nodes = [helper.make_node("Add", ["rows", "columns"], ["labels.value"])]
     constants = [tensor("rows", fours(rows)), tensor("columns", fours(columns)), tensor("surface.value", surface)]
+    channels = {"labels": 4 * (COARSE + INDEX), "surface": SURFACE}
+    return same_for_everybody("dense_head", nodes, "rois", CHANNELS, constants, channels)
+
+
+def keypoints():
+    rows, columns = np.zeros((OUTPUT, 1, KEYPOINTS), np.float32), np.zeros((1, OUTPUT, KEYPOINTS), np.float32)
+    for k in range(KEYPOINTS - 1):
+        rows[k, 0, k] = columns[0, OUTPUT - 1 - k, k] = 20
+    nodes = [helper.make_node("Add", ["rows", "columns"], ["keypoints.value"])]
+    constants = [tensor("rows", fours(rows)), tensor("columns", fours(columns))]
+    return same_for_everybody("keypoints", nodes, "surface", SURFACE, constants, {"keypoints": 4 * KEYPOINTS})
+
+
+def same_for_everybody(name, nodes, given, given_channels, constants, channels):
+    """A graph that gives each person of its input `given` the constants "OUTPUT.value". channels: of each output."""
+    nodes = [helper.make_node("Shape", [given], ["people"], start=0, end=1), *nodes]
     outputs = []
-    for name, channels in (("labels", 4 * (COARSE + INDEX)), ("surface", SURFACE)):
-        constants.append(tensor(f"{name}.rest", np.array([DENSE_POOL, DENSE_POOL, channels], np.int64)))
+    for output, count in channels.items():
+        constants.append(tensor(f"{output}.rest", np.array([DENSE_POOL, DENSE_POOL, count], np.int64)))
         nodes += [
-            helper.make_node("Concat", ["people", f"{name}.rest"], [f"{name}.shape"], axis=0),
-            helper.make_node("Expand", [f"{name}.value", f"{name}.shape"], [name]),
+            helper.make_node("Concat", ["people", f"{output}.rest"], [f"{output}.shape"], axis=0),
+            helper.make_node("Expand", [f"{output}.value", f"{output}.shape"], [output]),
         ]
-        outputs.append((name, ["people", DENSE_POOL, DENSE_POOL, channels]))
-    return graph("dense_head", nodes, [("rois", ["people", DENSE_POOL, DENSE_POOL, CHANNELS])], outputs, constants)
+        outputs.append((output, ["people", DENSE_POOL, DENSE_POOL, count]))
+    inputs = [(given, ["people", DENSE_POOL, DENSE_POOL, given_channels])]
+    return graph(name, nodes, inputs, outputs, constants)
 
 
 def charts():
@@ -159,6 +174,7 @@ def main():
         ("rpn_coarse", rpn("rpn_coarse", range(3, 7))),
         ("box_head", box_head()),
         ("dense_head", dense_head()),
+        ("keypoints", keypoints()),
     ):
         (folder / f"{name}.onnx").write_bytes(model.SerializeToString())
         graphs[name] = {"inputs": dict(inputs), "outputs": dict(outputs)}
@@ -192,6 +208,7 @@ def main():
             "mask_threshold": 0.5,
             "min_visible_fraction": 0.3,
         },
+        "keypoints": {"count": KEYPOINTS},
         "charts": {"file": "charts.f32"},
     }
     write_manifest(folder, "densepose", BundleInfo("tiny", "fp32", version="1"), graphs, ["charts.f32"], task_keys)

@@ -20,7 +20,8 @@ CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/assembly", "scene/render"}
-DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/surface", "densepose/tracking"}
+DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/keypoints", "densepose/surface",
+             "densepose/tracking"}  # fmt: skip
 CURVES = {"edges", "edges/curves"}
 HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/registration"}
 SYSTEMS = (
@@ -50,7 +51,8 @@ MAY_INCLUDE = {
     "densepose/detector": BASE | {"core/trace", "densepose/bundle"},
     "densepose/surface": BASE | {"densepose/bundle", "densepose/detector"},
     "densepose/tracking": BASE | {"densepose/detector", "densepose/surface"},
-    "densepose/crops": BASE | DENSEPOSE - {"densepose/crops", "densepose/tracking"},
+    "densepose/keypoints": BASE | {"densepose/bundle"},
+    "densepose/crops": BASE | DENSEPOSE - {"densepose/crops", "densepose/keypoints", "densepose/tracking"},
     "edges": BASE,
     "edges/curves": BASE - {"nn"} | {"edges"},
     "edges/files": BASE - {"nn"} | CURVES,

@@ -65,6 +65,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   require_range(field("person_crops"), number_in(config.person_crops), int32_t(MAQ_DENSEPOSE_CROPS_DEFAULT),
                 int32_t(MAQ_DENSEPOSE_CROPS_OFF));
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
+  require_range(field("has_keypoints"), config.has_keypoints, 0, 1);
   DensePoseSettings settings;
   settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
   settings.long_side_px = config.long_side_px;
@@ -78,6 +79,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   settings.crop_side_px = config.person_crop_px;
   if (settings.crop_side_px == 0 && config.preset == MAQ_DENSEPOSE_PRESET_PHOTO)
     settings.crop_side_px = kPhotoCropSidePx;
+  settings.keypoints = config.has_keypoints == 1;
   settings.provider = config.model.provider;
   return settings;
 }
@@ -98,6 +100,10 @@ void maq_densepose_get_part_colour(int32_t part, uint8_t rgb[3]) {
   if (rgb == nullptr) return;
   const BodyPart* const known = body_part(part);
   for (size_t i = 0; i < 3; ++i) rgb[i] = known == nullptr ? uint8_t(0) : known->rgb[i];
+}
+
+const char* maq_densepose_get_keypoint_name(int32_t keypoint) {
+  return keypoint >= 0 && size_t(keypoint) < kKeypoints ? kKeypointNames[size_t(keypoint)] : "unknown";
 }
 
 maq_status maq_densepose_config_init(maq_densepose_config* config, uint32_t struct_size) {
@@ -199,6 +205,23 @@ maq_status maq_densepose_result_get_head_box(const maq_densepose_result* result,
   });
 }
 
+maq_status maq_densepose_result_get_keypoints(const maq_densepose_result* result, uint32_t index, float keypoints[99]) {
+  static_assert(3 * MAQ_DENSEPOSE_KEYPOINT_COUNT == 99 && kKeypoints == MAQ_DENSEPOSE_KEYPOINT_COUNT);
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_argument(keypoints, "keypoints");
+    require_index("index", index, result->result.people.size());
+    if (result->result.keypoints.empty())
+      throw Error(MAQ_ERROR_NOT_FOUND, "No keypoints were asked for; set has_keypoints in maq_densepose_config.");
+    for (const Keypoint& keypoint : result->result.keypoints[index]) {
+      *keypoints++ = keypoint.x_px;
+      *keypoints++ = keypoint.y_px;
+      *keypoints++ = keypoint.confidence;
+    }
+    return MAQ_OK;
+  });
+}
+
 maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                           const uint8_t** pixels, size_t* stride_bytes) {
   return guarded(result, __func__, [&] {
@@ -226,6 +249,7 @@ maq_status maq_densepose_result_get_stats(const maq_densepose_result* result, ma
     filled.dense_head_ms = from.dense_head_ms;
     filled.crops_ms = from.crops_ms;
     filled.decode_ms = from.decode_ms;
+    filled.keypoints_ms = from.keypoints_ms;
     filled.total_ms = from.total_ms;
     filled.network_width_px = from.network_width_px;
     filled.network_height_px = from.network_height_px;

@@ -114,6 +114,10 @@ DensePoseSpec read_densepose_spec(const Manifest& manifest) {
   if (const auto surface = manifest.root.find("surface")) {
     spec.surface_file = manifest.listed_file(surface->at("file"));
   }
+  if (const auto keypoints = manifest.root.find("keypoints")) {
+    manifest.require_graphs({"keypoints"});
+    spec.keypoints = keypoints->at("count").integer(1, 1024);
+  }
   if (const auto charts = manifest.root.find("crop_charts")) {
     manifest.require_graphs({"crop_trunk", "crop_dense_head"});
     spec.crop_charts_file = manifest.listed_file(charts->at("file"));

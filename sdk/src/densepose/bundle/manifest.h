@@ -55,6 +55,7 @@ struct DensePoseSpec {
   DenseHeadSpec dense_head;
   std::string charts_file;
   std::string surface_file;      // "" when the bundle has none
+  int keypoints = 0;             // how many the bundle finds of a person; 0: it has no network for them
   std::string crop_charts_file;  // "" if crops use the networks of the whole image
 };
 

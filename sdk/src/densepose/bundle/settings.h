@@ -19,6 +19,7 @@ struct DensePoseSettings {
   PersonCrops crops = PersonCrops::kOff;
   int crop_side_px = 0;
   bool surface = true;
+  bool keypoints = false;
   maq_provider provider = MAQ_PROVIDER_CPU;
 };
 

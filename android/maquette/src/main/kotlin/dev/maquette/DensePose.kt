@@ -65,6 +65,7 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      * @property scoreThreshold minimum score of a person.
      * @property resultPoolSize results that the app may hold at once, 1 to 64; 0: 4.
      * @property keyFrameInterval 0 and 1: people are detected in each frame; N: in every N-th frame of a stream.
+     * @property hasKeypoints whether [Person.keypoints] are found.
      * @property minPersonHeightPx people less tall than this in the frame may be missed.
      * @property provider networks for which it cannot be had, or of which it takes less than half, run on the CPU;
      *   [DensePoseResult.Stats.provider] tells. The shipped int8 networks gain nothing from XNNPACK.
@@ -83,6 +84,7 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
         val personCropPx: Int = 0,
         val provider: Provider = Provider.CPU,
         val preset: Preset = Preset.STREAM,
+        val hasKeypoints: Boolean = false,
     ) {
         internal fun native(bundle: ModelBundle) =
             maq_densepose_config().also {
@@ -98,6 +100,7 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
                 it.detail = detail.code
                 it.person_crops = personCrops.code
                 it.person_crop_px = personCropPx
+                it.has_keypoints = if (hasKeypoints) 1 else 0
             }
     }
 
@@ -149,9 +152,22 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
 }
 
 /**
+ * A place on a person, in pixels of the frame; low confidence (0 to 1) if the frame does not show it.
+ *
+ * @property name as in MediaPipe Pose: "left_wrist". "Left" is the person's left.
+ */
+data class Keypoint(
+    val name: String,
+    val x: Float,
+    val y: Float,
+    val confidence: Float,
+)
+
+/**
  * Edges in pixels of the frame, the right and the bottom one exclusive; score 0 to 1.
  *
  * @property id from 1; in a stream the same for one person while seen.
+ * @property keypoints the 33 keypoints of MediaPipe Pose, in its order; empty without [DensePose.Config.hasKeypoints].
  */
 data class Person(
     val left: Float,
@@ -160,6 +176,7 @@ data class Person(
     val bottom: Float,
     val score: Float,
     val id: Long,
+    val keypoints: List<Keypoint> = emptyList(),
 )
 
 /** The people of a frame, best score first, and a byte for each pixel of the frame in four planes. */
@@ -191,6 +208,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
         val denseHeadMs: Double,
         val cropsMs: Double,
         val decodeMs: Double,
+        val keypointsMs: Double,
         val totalMs: Double,
         val networkWidthPx: Int,
         val networkHeightPx: Int,
@@ -221,8 +239,20 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
                         Native.maq_densepose_result_get_person(it, index, person)
                     }
                 val (left, top, right, bottom) = person.box_px
-                Person(left, top, right, bottom, person.score, person.id)
+                Person(left, top, right, bottom, person.score, person.id, keypointsOf(index))
             }
+    }
+
+    private fun keypointsOf(person: Int): List<Keypoint> {
+        val values = Memory(3 * MAQ_DENSEPOSE_KEYPOINT_COUNT * Float.SIZE_BYTES)
+        orNull(Status.NOT_FOUND) {
+            handle.use { Native.maq_densepose_result_get_keypoints(it, person, values) }
+        } ?: return emptyList()
+        val flat = values.floats(0, 3 * MAQ_DENSEPOSE_KEYPOINT_COUNT)
+        return List(MAQ_DENSEPOSE_KEYPOINT_COUNT) {
+            val name = textAt(Native.maq_densepose_get_keypoint_name(it))
+            Keypoint(name, flat[3 * it], flat[3 * it + 1], flat[3 * it + 2])
+        }
     }
 
     /**
@@ -308,7 +338,7 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
             val s = handle.read(maq_densepose_stats(), Native::maq_densepose_result_get_stats)
             return Stats(
                 s.preprocess_ms, s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms,
-                s.total_ms, s.network_width_px, s.network_height_px, s.proposal_count, s.person_count, s.crop_count,
+                s.keypoints_ms, s.total_ms, s.network_width_px, s.network_height_px, s.proposal_count, s.person_count, s.crop_count,
                 s.dropped_box_count, s.body_pixel_count, s.clamped_pixel_count, s.is_key_frame != 0,
                 DensePose.Provider.of(s.provider), s.threads, s.is_threads_measured != 0,
             )

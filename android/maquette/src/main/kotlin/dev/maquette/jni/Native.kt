@@ -33,6 +33,7 @@ internal object Native {
     @JvmStatic external fun maq_densepose_cancel(densepose: Long)
     @JvmStatic external fun maq_densepose_create(context: Long, config: Memory?): Long
     @JvmStatic external fun maq_densepose_destroy(densepose: Long)
+    @JvmStatic external fun maq_densepose_get_keypoint_name(keypoint: Int): Long
     @JvmStatic external fun maq_densepose_get_part_colour(part: Int, rgb: Memory?)
     @JvmStatic external fun maq_densepose_get_part_name(part: Int): Long
     @JvmStatic external fun maq_densepose_get_surface(densepose: Long, surface: Memory?)
@@ -43,6 +44,7 @@ internal object Native {
     @JvmStatic external fun maq_densepose_model_set_roll(model: Long, roll_rad: Float)
     @JvmStatic external fun maq_densepose_reset(densepose: Long)
     @JvmStatic external fun maq_densepose_result_get_head_box(result: Long, index: Int, box_px: Memory?)
+    @JvmStatic external fun maq_densepose_result_get_keypoints(result: Long, index: Int, keypoints: Memory?)
     @JvmStatic external fun maq_densepose_result_get_person(result: Long, index: Int, person: Memory?)
     @JvmStatic external fun maq_densepose_result_get_person_count(result: Long): Int
     @JvmStatic external fun maq_densepose_result_get_plane(result: Long, plane: Int, pixels: Memory?,
@@ -255,10 +257,10 @@ internal const val MAQ_ERROR_INTERNAL = 12; internal const val MAQ_END_OF_STREAM
 internal const val MAQ_TIMEOUT = 14; internal const val MAQ_ERROR_DEVICE_LOST = 15
 internal const val MAQ_ERROR_BUSY = 16; internal const val MAQ_ERROR_NO_PERMISSION = 17
 internal const val MAQ_ERROR_UNWRITABLE = 18; internal const val MAQ_CANCELLED = 19
-internal const val MAQ_HEADER_VERSION = 300; internal const val MAQ_HEAD_ALL_TRIANGLES = -1
-internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1; internal const val MAQ_SCENE_LONG_SIDE_FULL = -1
-internal const val MAQ_SCENE_VARIATION_ALL = -1; internal const val MAQ_THREADS_MEASURED = -1
-internal const val MAQ_WAIT_FOREVER = -1
+internal const val MAQ_HEADER_VERSION = 300; internal const val MAQ_DENSEPOSE_KEYPOINT_COUNT = 33
+internal const val MAQ_HEAD_ALL_TRIANGLES = -1; internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1
+internal const val MAQ_SCENE_LONG_SIDE_FULL = -1; internal const val MAQ_SCENE_VARIATION_ALL = -1
+internal const val MAQ_THREADS_MEASURED = -1; internal const val MAQ_WAIT_FOREVER = -1
 
 internal class maq_camera_info(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
     val uri get() = Pointer(this, 8); val name get() = Pointer(this, 16); val bus get() = Pointer(this, 24)
@@ -331,6 +333,7 @@ internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct
     var detail: Int get() = int(68); set(v) = int(68, v); var person_crops: Int get() = int(72); set(v) = int(72, v)
     var person_crop_px: Int get() = int(76); set(v) = int(76, v)
     var result_pool_size: Int get() = int(80); set(v) = int(80, v)
+    var has_keypoints: Int get() = int(84); set(v) = int(84, v)
 }
 
 internal class maq_densepose_model_stats(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {
@@ -341,7 +344,7 @@ internal class maq_densepose_person(outer: Memory? = null, at: Int = 0) : Struct
     val score get() = float(4); val box_px get() = floats(8, 4); val id get() = long(24)
 }
 
-internal class maq_densepose_stats(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {
+internal class maq_densepose_stats(outer: Memory? = null, at: Int = 0) : Struct(104, outer, at) {
     val preprocess_ms get() = float(4).toDouble(); val trunk_ms get() = float(8).toDouble()
     val proposals_ms get() = float(12).toDouble(); val box_head_ms get() = float(16).toDouble()
     val dense_head_ms get() = float(20).toDouble(); val crops_ms get() = float(24).toDouble()
@@ -350,6 +353,7 @@ internal class maq_densepose_stats(outer: Memory? = null, at: Int = 0) : Struct(
     val person_count get() = int(48); val crop_count get() = int(52); val dropped_box_count get() = int(56)
     val body_pixel_count get() = long(64); val clamped_pixel_count get() = long(72); val is_key_frame get() = int(80)
     val provider get() = int(84); val threads get() = int(88); val is_threads_measured get() = int(92)
+    val keypoints_ms get() = float(96).toDouble()
 }
 
 internal class maq_densepose_surface(outer: Memory? = null, at: Int = 0) : Struct(16, outer, at) {

@@ -70,7 +70,7 @@ metrics:
   left/right               of the landmarks of limbs with a limb painted, those with the right side
   chest or back            of people with a torso painted whose shoulders show which way they face, those with more
                            of the right side of it
-  keypoints                of the visible landmarks of people who show their torso, those with a keypoint closer than 0.1
+  keypoints                of the visible landmarks of people who show their torso, those with a keypoint within 0.1
                            torsos; and of limbs' keypoints near a landmark or its mirror, those nearer to the landmark
   false people             shown per photo without people; per photo of animals
 
@@ -103,7 +103,8 @@ class PhotoSet:
 @dataclass(frozen=True)
 class PhotoMetrics:
     """Fractions 0..1; NaN: nothing to measure. Calibration is over photos with people. landmark: fraction right by
-    landmark name. keypoints: None where the backend has none. groups, failures: as for rendered images, with landmarks in place of pixels."""
+    landmark name. keypoints: None where the backend has none. groups, failures: as for rendered images, with landmarks
+    in place of pixels."""
 
     photos: int
     people: int

@@ -79,7 +79,8 @@ def from_left_to_right(found):
     """The same people in another order: scores of the tiny bundle differ by rounding alone."""
     order = np.argsort(found.box[:, 0])
     number = np.concatenate([[0], 1 + np.argsort(order)]).astype(np.uint8)
-    return replace(found, box=found.box[order], score=found.score[order], inds=number[found.inds])
+    keypoint = found.keypoint[order]
+    return replace(found, box=found.box[order], score=found.score[order], inds=number[found.inds], keypoint=keypoint)
 
 
 @needs_library
@@ -93,13 +94,14 @@ def test_both_ways_give_the_same_people_and_the_same_image(size, bundle_without_
     monkeypatch.setattr(decode, "STD", np.array(given["std"], np.float32))
     image = picture(*size)
     long_side_px = given["long_side_px"]  # the reference has one size
-    api = CApiBackend(bundle_without_ties, 0.05, long_side_px=long_side_px).predict(image)
+    api = CApiBackend(bundle_without_ties, 0.05, long_side_px=long_side_px, has_keypoints=1).predict(image)
     onnx = OnnxBackend(bundle_without_ties, 0.05).predict(image)
     assert len(api.box) == len(onnx.box) == 3
     api, onnx = from_left_to_right(api), from_left_to_right(onnx)
     assert np.allclose(api.box, onnx.box, atol=0.01)
     # The library does not round to bytes between resizing and normalising.
     assert np.allclose(api.score, onnx.score, atol=1e-4 if size == (320, 256) else 1e-3)
+    assert np.allclose(api.keypoint, onnx.keypoint, atol=0.02)
     assert (api.inds == onnx.inds).mean() > 0.999
     assert (api.iuv[..., 0] == onnx.iuv[..., 0]).mean() > 0.999
     assert np.abs(api.iuv.astype(int) - onnx.iuv).max(-1)[api.iuv[..., 0] == onnx.iuv[..., 0]].max() <= 1

@@ -13,7 +13,7 @@
 #   scripts/install-packages.sh windows     to build the SDK, and: a compiler for Windows, what builds codecs, Wine (1.2 GB)
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian, and qemu for one of arm64
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
-#   scripts/install-packages.sh site        to build the site: Doxygen, Maven
+#   scripts/install-packages.sh site        to build the site: Doxygen, Maven; and Chromium, to test it
 #   scripts/install-packages.sh test lint   what both need, at once
 #
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
@@ -138,6 +138,7 @@ if wants site; then
     needs_command doxygen doxygen
     needs_command javac openjdk-17-jdk-headless
     needs_command mvn maven           # brings Dokka
+    needs_command chromium chromium   # shows a page to the tests
 fi
 if wants release; then
     needs_command dh debhelper

@@ -137,7 +137,7 @@ def tarball(tmp_path) -> Path:
 
 def test_pkg_config_links_a_program_to_the_tarball_by_the_commands_of_the_guide(tarball, tmp_path):
     guide = (ROOT / "docs/guide/link.md").read_text().split("## From the tarball of a release")[1]
-    commands = [line.strip() for line in guide.split("\n## ")[0].splitlines() if line.startswith("    ")]
+    commands = guide.split("```sh\n")[1].split("```")[0].splitlines()
     commands[0] = f"ln -s {tarball} $(basename {commands[0].split()[-1]} .tar.gz)"  # unpacked already
     done = subprocess.run(["sh", "-ec", "\n".join(commands)], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

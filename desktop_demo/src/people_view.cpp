@@ -14,7 +14,8 @@ namespace {
 constexpr OwnSources kSources = {kFirstCamera, kFirstCamera, "stub:people?count=2",
                                  "These people are rendered; drop a photo, a clip or a recording here."};
 constexpr const char* kStages[] = {"trunk",  "proposals", "box head", "dense head", "crops",
-                                   "decode", "resize",    "copy",     "wait"};
+                                   "decode", "keypoints", "resize",   "copy",       "wait"};
+constexpr float kMinConfidence = 0.3f;  // of a keypoint that is drawn
 
 }  // namespace
 
@@ -49,8 +50,8 @@ bool PeopleView::update() {
   if (!frames_.take()) return false;
   painter_.set_frame(frame());
   const maq_densepose_stats& s = frame().stats;
-  stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms, s.preprocess_ms,
-               float(frame().copying_ms), float(frame().waiting_ms)});
+  stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms, s.keypoints_ms,
+               s.preprocess_ms, float(frame().copying_ms), float(frame().waiting_ms)});
   return true;
 }
 
@@ -70,6 +71,7 @@ Action PeopleView::press(int key) {
   if (key == GLFW_KEY_A) return Action::kAddToHead;
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
+  if (key == GLFW_KEY_K) show_skeletons(model_.has_keypoints == 0);
   return LiveView::press(key);
 }
 
@@ -84,24 +86,43 @@ void PeopleView::draw(const Rect& area) {
   image_rect_ = area.fit(frame().camera.width_px, frame().camera.height_px);
   painter_.draw_people(view_, image_rect_);
   if (view_ == View::kBoxes) draw_boxes();
+  if (model_.has_keypoints != 0) draw_skeletons();
   if (!shows_mesh_) return;
   const int side = std::min(area.width, area.height) * 3 / 10;
   mesh_rect_ = {0, area.height - side, side, side};
   painter_.draw_body(mesh_rect_, yaw_, pitch_);
 }
 
+void PeopleView::draw_skeletons() const {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  for (uint32_t person = 0; person < frame().people.size(); ++person) {
+    std::array<float, 3> flat[MAQ_DENSEPOSE_KEYPOINT_COUNT];
+    // The frame may be of the model before, which found no keypoints.
+    if (maq_densepose_result_get_keypoints(frame().result->get(), person, flat[0].data()) != MAQ_OK) return;
+    for (const maquette::Bone& bone : maquette::kSkeleton) {
+      const auto& from = flat[bone.from];
+      const auto& to = flat[bone.to];
+      if (std::min(from[2], to[2]) < kMinConfidence) continue;
+      const ImVec2 a = on_screen(from[0], from[1]), b = on_screen(to[0], to[1]);
+      list->AddLine(a, b, IM_COL32(24, 26, 40, 255), 6 * window_.scale());
+      list->AddLine(a, b, IM_COL32(255, 255, 255, 255), 3 * window_.scale());
+    }
+  }
+}
+
+ImVec2 PeopleView::on_screen(float x_px, float y_px) const {
+  const float scale = float(image_rect_.width) / float(frame().camera.width_px);
+  return {float(image_rect_.x) + x_px * scale, float(image_rect_.y) + y_px * scale};
+}
+
 void PeopleView::draw_boxes() const {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const float scale = float(image_rect_.width) / float(frame().camera.width_px);
-  const auto on_screen = [&](float x, float y) {
-    return ImVec2(float(image_rect_.x) + x * scale, float(image_rect_.y) + y * scale);
-  };
   for (const maq_densepose_person& person : frame().people) {
     const ImVec2 from = on_screen(person.box_px[0], person.box_px[1]);
     const ImVec2 to = on_screen(person.box_px[2], person.box_px[3]);
     list->AddRect(from, to, IM_COL32(255, 255, 255, 255), 0, 0, 2 * window_.scale());
-    char score[8];
-    std::snprintf(score, sizeof score, "%.2f", double(person.score));
+    char score[40];
+    std::snprintf(score, sizeof score, "#%lld %.2f", static_cast<long long>(person.id), double(person.score));
     const ImVec2 size = ImGui::CalcTextSize(score);
     const float top = std::max(float(image_rect_.y), from.y - size.y - 4);
     list->AddRectFilled({from.x, top}, {from.x + size.x + 8, top + size.y + 4}, IM_COL32(255, 255, 255, 255));
@@ -158,10 +179,17 @@ void PeopleView::draw_views() {
     if (view % 3 != 0) ImGui::SameLine(float(view % 3) * 100 * window_.scale());
     if (ImGui::RadioButton(kViewNames[view], view_ == View(view))) view_ = View(view);
   }
+  bool shows_skeletons = model_.has_keypoints != 0;
+  if (ImGui::Checkbox("skeletons (K)", &shows_skeletons)) show_skeletons(shows_skeletons);
   ImGui::Checkbox("body surface (M)", &shows_mesh_);
   ImGui::SameLine();
   draw_pause();
   if (view_ == View::kTryOn) ImGui::TextWrapped("Drop a picture to wear it.");
+}
+
+void PeopleView::show_skeletons(bool shows) {
+  model_.has_keypoints = shows ? 1 : 0;
+  live_.set_model(model_);
 }
 
 void PeopleView::draw_model_options() {

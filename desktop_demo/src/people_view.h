@@ -5,6 +5,7 @@
 #include <app/live_head.h>
 #include <app/mapped_frame.h>
 #include <app/triple_buffer.h>
+#include <imgui.h>
 #include <optional>
 #include <vector>
 
@@ -31,7 +32,10 @@ class PeopleView final : public LiveView {
 
  private:
   const maquette::MappedFrame& frame() const { return frames_.front(); }
+  ImVec2 on_screen(float x_px, float y_px) const;  // a point of the frame
+  void draw_skeletons() const;
   void draw_boxes() const;
+  void show_skeletons(bool shows);  // loads the networks again
   void draw_views();
   void draw_model_options();
 

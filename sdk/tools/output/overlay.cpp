@@ -173,35 +173,6 @@ void draw_box(const maq_densepose_person& person, int scale, Canvas& canvas) {
   canvas.text(text, left + pad, top + pad, thickness, kInk);
 }
 
-struct Bone {
-  maq_densepose_keypoint from, to;
-};
-
-constexpr Bone kBones[] = {
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP, MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_LEFT_ELBOW},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_SHOULDER, MAQ_DENSEPOSE_KEYPOINT_RIGHT_ELBOW},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_ELBOW, MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_ELBOW, MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST, MAQ_DENSEPOSE_KEYPOINT_LEFT_INDEX},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST, MAQ_DENSEPOSE_KEYPOINT_RIGHT_INDEX},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_WRIST, MAQ_DENSEPOSE_KEYPOINT_LEFT_THUMB},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_WRIST, MAQ_DENSEPOSE_KEYPOINT_RIGHT_THUMB},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_HIP, MAQ_DENSEPOSE_KEYPOINT_LEFT_KNEE},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_HIP, MAQ_DENSEPOSE_KEYPOINT_RIGHT_KNEE},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_KNEE, MAQ_DENSEPOSE_KEYPOINT_LEFT_ANKLE},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_KNEE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_ANKLE},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_ANKLE, MAQ_DENSEPOSE_KEYPOINT_LEFT_FOOT_INDEX},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_ANKLE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_FOOT_INDEX},
-    {MAQ_DENSEPOSE_KEYPOINT_NOSE, MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE},
-    {MAQ_DENSEPOSE_KEYPOINT_NOSE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE},
-    {MAQ_DENSEPOSE_KEYPOINT_LEFT_EYE, MAQ_DENSEPOSE_KEYPOINT_LEFT_EAR},
-    {MAQ_DENSEPOSE_KEYPOINT_RIGHT_EYE, MAQ_DENSEPOSE_KEYPOINT_RIGHT_EAR},
-};
-
 // Lines between keypoints of enough confidence: cool to the person's left, warm to the right, as the parts.
 void draw_skeleton(const maquette::DensePoseResult& result, uint32_t person, int scale, Canvas& canvas) {
   constexpr float kMinConfidence = 0.3f;
@@ -216,7 +187,7 @@ void draw_skeleton(const maquette::DensePoseResult& result, uint32_t person, int
     return name.find("left") != std::string::npos ? kLeft : name.find("right") != std::string::npos ? kRight : kMiddle;
   };
   for (const bool is_shadow : {true, false}) {
-    for (const Bone& bone : kBones) {
+    for (const maquette::Bone& bone : maquette::kSkeleton) {
       if (std::min(keypoints[bone.from][2], keypoints[bone.to][2]) < kMinConfidence) continue;
       const bool is_across = colour_of(bone.from) != colour_of(bone.to) && bone.from != MAQ_DENSEPOSE_KEYPOINT_NOSE;
       canvas.line(place(bone.from), place(bone.to), is_shadow ? width + 2 : width,

@@ -75,9 +75,7 @@ TEST(ApiDensePose, KeypointsAreReadByPersonAndOnlyWhereTheyWereAskedFor) {
     maquette::DensePose densepose(context, config);
     const maquette::DensePoseResult result = densepose.run(maquette::Frame(context, image.desc));
     EXPECT_EQ(maq_densepose_result_get_keypoints(result.get(), 0, flat), MAQ_ERROR_NOT_FOUND);
-    EXPECT_STREQ(maq_last_error(nullptr),
-                 "maq_densepose_result_get_keypoints: No keypoints were asked for; set has_keypoints in "
-                 "maq_densepose_config.");
+    EXPECT_STREQ(maq_last_error(nullptr), "No keypoints were asked for; set has_keypoints in maq_densepose_config.");
   }
   config.has_keypoints = 1;
   maquette::DensePose densepose(context, config);

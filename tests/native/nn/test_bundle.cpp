@@ -192,7 +192,7 @@ TEST(Bundle, FromMemoryNeedsAManifestAndEachNameOnce) {
   empty[1].data = nullptr;
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "but its data is NULL", [&] { maq::read_bundle(empty); });
   memory.contents.erase("manifest.json");
-  expect_error(MAQ_ERROR_NOT_FOUND, "None of the 6 buffers", [&] { maq::read_bundle(memory.buffers()); });
+  expect_error(MAQ_ERROR_NOT_FOUND, "None of the 7 buffers", [&] { maq::read_bundle(memory.buffers()); });
   expect_error(MAQ_ERROR_NOT_FOUND, "manifest.json", [] { maq::read_bundle(std::vector<maq::NamedBuffer>()); });
 }
 

@@ -18,7 +18,7 @@ TEST(Manifest, ReadsEveryField) {
   EXPECT_EQ(manifest.name, "tiny");
   EXPECT_EQ(manifest.task, "densepose");
   EXPECT_EQ(manifest.precision, "fp32");
-  EXPECT_EQ(manifest.files.size(), 6u);
+  EXPECT_EQ(manifest.files.size(), 7u);
   EXPECT_EQ(manifest.graphs.at("trunk").outputs.size(), 6u);
   EXPECT_EQ(manifest.graphs.at("rpn_coarse").inputs.size(), 4u);
   EXPECT_EQ(std::get<int64_t>(manifest.graphs.at("trunk").outputs[0].shape[3]), 3);
@@ -61,7 +61,7 @@ TEST(Manifest, AnErrorDoesNotQuoteAllOfAnEndlessValue) {
 void expect_each_key_needed(const json& node, const json::json_pointer& at) {
   // Keys for readers, and keys of the task.
   const std::vector<std::string> free = {"licence", "training_data", "measured", "opset"};
-  const std::vector<std::string> of_task = {"input", "rpn", "box_head", "dense_head", "charts"};
+  const std::vector<std::string> of_task = {"input", "rpn", "box_head", "dense_head", "keypoints", "charts"};
   for (const auto& [key, value] : node.items()) {
     if (std::find(free.begin(), free.end(), key) != free.end()) continue;
     if (at.empty() && std::find(of_task.begin(), of_task.end(), key) != of_task.end()) continue;

@@ -14,7 +14,7 @@ NAMES = (
 )  # fmt: skip
 COUNT = len(NAMES)
 _OTHER_SIDE = {"left": "right", "right": "left"}
-# Of each keypoint the one that the mirrored image shows in its place.
+# For each keypoint, the one that the mirrored image shows in its place.
 MIRROR = np.array([NAMES.index(" ".join(_OTHER_SIDE.get(word, word) for word in name.split())) for name in NAMES])
 # In COCO's order: nose, eyes, ears, shoulders, elbows, wrists, hips, knees, ankles.
 COCO = np.array([0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28])

@@ -26,7 +26,7 @@ KEYPOINTS = (
     "right_thumb", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle", "right_ankle", "left_heel",
     "right_heel", "left_foot_index", "right_foot_index",
 )  # fmt: skip
-# Of the keypoints, those of COCO, in its order: people's `keypoints[COCO_KEYPOINTS]` is [17, 3].
+# COCO's keypoints among them, in COCO's order: `person.keypoints[COCO_KEYPOINTS]` is [17, 3].
 COCO_KEYPOINTS = [0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28]
 
 

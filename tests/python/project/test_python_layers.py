@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[3]
 ALLOWED = {
     "export.surface": set(),
     "export.surface_grid": {"export.surface"},
+    "export.keypoints": set(),
     "export.shards": {"export.surface"},
     "export.camera": set(),
     "export.point_cloud": set(),
@@ -32,12 +33,12 @@ ALLOWED = {
     "export.solids": {"export.camera", "export.jobs", "export.photos"},
     "export.clips": {"export.camera", "export.jobs", "export.people", "export.places"},
     "export.densepose": {
-        "export.bundle", "export.data_sources", "export.onnx_graphs", "export.shards", "export.surface",
-        "export.surface_grid", "export.training",
+        "export.bundle", "export.data_sources", "export.keypoints", "export.onnx_graphs", "export.shards",
+        "export.surface", "export.surface_grid", "export.training",
     },
     "export.teachers": {
-        "export.camera", "export.densepose", "export.jobs", "export.pack_file", "export.people", "export.photos",
-        "export.shards", "export.surface",
+        "export.camera", "export.densepose", "export.jobs", "export.keypoints", "export.pack_file", "export.people",
+        "export.photos", "export.shards", "export.surface",
     },
     "export.prediction": {
         "export.bundle", "export.checked_file", "export.clips", "export.data_sources", "export.densepose",
@@ -53,13 +54,13 @@ ALLOWED = {
     },
     "export.heads": {
         "export.bundle", "export.camera", "export.checked_file", "export.data_sources", "export.densepose",
-        "export.onnx_graphs", "export.people", "export.teachers", "export.training",
+        "export.keypoints", "export.onnx_graphs", "export.people", "export.teachers", "export.training",
     },
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
-        "export.bundle", "export.densepose", "export.jobs", "export.people", "export.photos", "export.shards",
-        "export.surface", "export.teachers", "export.training",
+        "export.bundle", "export.densepose", "export.jobs", "export.keypoints", "export.people", "export.photos",
+        "export.shards", "export.surface", "export.teachers", "export.training",
     },
     "quantization": {"export"},
     "benchmarks": {"export", "quantization"},

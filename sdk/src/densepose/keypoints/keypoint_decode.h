@@ -2,11 +2,24 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
-#include "densepose/keypoints/keypoint_names.h"
 #include "image/crop_input.h"
 
 namespace maq {
+
+constexpr size_t kKeypoints = 33;
+
+// In the order of MediaPipe Pose.
+constexpr std::array<const char*, kKeypoints> kKeypointNames = {
+    "nose",        "left_eye_inner",  "left_eye",         "left_eye_outer", "right_eye_inner",
+    "right_eye",   "right_eye_outer", "left_ear",         "right_ear",      "mouth_left",
+    "mouth_right", "left_shoulder",   "right_shoulder",   "left_elbow",     "right_elbow",
+    "left_wrist",  "right_wrist",     "left_pinky",       "right_pinky",    "left_index",
+    "right_index", "left_thumb",      "right_thumb",      "left_hip",       "right_hip",
+    "left_knee",   "right_knee",      "left_ankle",       "right_ankle",    "left_heel",
+    "right_heel",  "left_foot_index", "right_foot_index",
+};
 
 // In pixels of the image. See maq_densepose_result_get_keypoints for the confidence.
 struct Keypoint {

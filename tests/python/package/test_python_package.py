@@ -5,6 +5,7 @@ import gc
 import maquette
 import numpy as np
 import pytest
+from maquette.native import native
 
 pytestmark = pytest.mark.skipif(
     not maquette.library_path().exists(), reason=f"{maquette.library_path()} is not built: run `make build`"
@@ -41,6 +42,24 @@ def test_people_of_a_frame_and_of_its_pixels_are_the_same(densepose, person):
     assert y.min() >= top - above
     assert y.max() <= bottom + above
     assert (of_frame.part == of_array.part).mean() > 0.99  # RGB of a frame that may have been NV12
+
+
+def test_keypoints_of_a_photo_lie_where_the_surface_shows_them(densepose):
+    photo = maquette.sample("photo.jpg")
+    assert densepose.run(photo).people[0].keypoints is None
+    (person,) = (result := maquette.DensePose(has_keypoints=True, threads=1).run(photo)).people
+    assert person.keypoints.shape == (33, 3)
+    assert person.keypoints[maquette.COCO_KEYPOINTS].shape == (17, 3)
+    # The sides of the head are parts 23 and 24; each keypoint of the face lies on one of them.
+    for name in ("nose", "left_eye", "right_eye", "mouth_left", "mouth_right"):
+        x, y, confidence = person.keypoints[maquette.KEYPOINTS.index(name)]
+        assert confidence > 0.3, name
+        assert result.part[int(y), int(x)] in (23, 24), name
+    left, right = (person.keypoints[maquette.KEYPOINTS.index(f"{side}_shoulder")] for side in ("left", "right"))
+    assert left[0] > right[0]  # the person faces us
+    n = native()
+    names = [n.ffi.string(n.lib.maq_densepose_get_keypoint_name(k)).decode() for k in range(33)]
+    assert tuple(names) == maquette.KEYPOINTS
 
 
 def test_red_and_blue_are_told_apart_by_the_format(densepose, person):

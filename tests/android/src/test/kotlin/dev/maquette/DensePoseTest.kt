@@ -76,6 +76,28 @@ class DensePoseTest : AndroidTest() {
     }
 
     @Test
+    fun keypointsHaveNamesPlacesAndConfidences() {
+        Maquette().use { maquette ->
+            maquette.decode(TestFiles.photo.readBytes()).use { frame ->
+                val bundle = ModelBundle.ofFolder(TestFiles.bundle.path)
+                maquette.densePose(bundle).use { it.run(frame).use { result ->
+                    assertTrue(result.people.single().keypoints.isEmpty())
+                } }
+                maquette.densePose(bundle, DensePose.Config(hasKeypoints = true)).use { it.run(frame).use { result ->
+                    val keypoints = result.people.single().keypoints
+                    assertEquals(33, keypoints.size)
+                    assertEquals("left_wrist", keypoints[15].name)
+                    val nose = keypoints.single { point -> point.name == "nose" }
+                    assertTrue(nose.confidence > 0.3f)
+                    val part = result.copyPlane(DensePoseResult.Plane.PART)
+                    assertTrue(part[nose.y.toInt() * result.widthPx + nose.x.toInt()] in 23..24)
+                    assertTrue(result.stats.keypointsMs > 0)
+                } }
+            }
+        }
+    }
+
+    @Test
     fun framesAreWhatTheAppGave() {
         Maquette().use { maquette ->
             val bitmap = Bitmap.createBitmap(3, 2, Bitmap.Config.ARGB_8888)

@@ -44,7 +44,7 @@ train)
     --labels "$work/labels" --facing "$work/facing" --cap "${CAP:-gm=40}" --repeat 2 --composed "${COMPOSED:-2000}" \
     --consistent export/weights/densepose-b.pt export/weights/densepose-b-crops.pt --out "$work/shards/train"
   "$python" -m torch.distributed.run --standalone --nproc-per-node "$processes" -m export.densepose.train --recipe usual \
-    --data "$work/rendered" --photos "$work/shards/train" --photo-fraction .6 --init export/weights/densepose-b.pt \
+    --data "$work/rendered" --photos "$work/shards/train" --photo-fraction .65 --init export/weights/densepose-b.pt \
     --out "$work/run" --threads 1 --batch 5 --crops 10 --boxes-every 2 --lr 6e-4 --backbone-rate 0.3 \
     --ema 0.998 --decay 0.5 --minutes "${MINUTES:-120}"
   ;;

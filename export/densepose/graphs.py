@@ -51,6 +51,7 @@ def open_bundle(folder: Path, threads: int = 1) -> Bundle:
     network = NetworkConfig(
         width=manifest["graphs"]["box_head"]["inputs"][0]["shape"][3],
         evidence=int("evidence_stride" in head),  # how many channels it has within the graph, no manifest says
+        keypoints=manifest[KEYPOINTS]["count"] if KEYPOINTS in manifest else 0,
         anchor_sizes=tuple(rpn["anchor_sizes_px"]),
         aspect_ratios=tuple(rpn["aspect_ratios"]),
         rpn_strides=tuple(rpn["strides"]),

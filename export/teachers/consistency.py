@@ -27,7 +27,7 @@ from export.densepose.person_crop import crop_around, cut, outline, turned_box
 from export.shards import BOX_ALONE, POSSIBLE_PARTS, UNSURE
 from export.surface import MIRROR_COARSE, MIRROR_FLIPS_U, MIRROR_FLIPS_V, MIRROR_PART, PART_COUNT
 
-CROP_SIDES_PX = (192, 256, 320)
+CROP_SIDES_PX = (256,)
 MIN_HEIGHT_PX = 96  # smaller people are no easy view
 MIN_PROBABILITY = 0.7  # of a part, as the mean of all answers
 FINDING = DecodeConfig(long_side=480, score_threshold=0.3)  # of people whom the teachers may have missed

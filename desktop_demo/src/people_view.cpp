@@ -15,7 +15,7 @@ constexpr OwnSources kSources = {kFirstCamera, kFirstCamera, "stub:people?count=
                                  "These people are rendered; drop a photo, a clip or a recording here."};
 constexpr const char* kStages[] = {"trunk",  "proposals", "box head", "dense head", "crops",
                                    "decode", "resize",    "copy",     "wait"};
-constexpr float kMinConfidence = 0.3f;  // of a keypoint that is drawn
+constexpr float kMinConfidence = 0.15f;  // of a keypoint that is drawn
 
 }  // namespace
 

@@ -227,8 +227,8 @@ MAQ_API maq_status maq_densepose_result_get_head_box(const maq_densepose_result*
 
 /* Gets the keypoints of a person, 99 numbers: x, y and confidence of each keypoint, in the order of
  * maq_densepose_keypoint. x and y are in pixels of the frame. The confidence, 0 to 1, is the probability that the
- * keypoint lies within about 4 % of the person's box of there. It is low for keypoints that the frame does not show;
- * below 0.3 the place means little.
+ * keypoint lies within about 4 % of the person's box of there. It is low for keypoints that the frame does not show. Of
+ * the keypoints with 0.15 or more, most are right; below, the place means little.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (has_keypoints was 0).
  * Does not block. */
 MAQ_API maq_status maq_densepose_result_get_keypoints(const maq_densepose_result* result, uint32_t index,

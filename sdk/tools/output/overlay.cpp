@@ -175,7 +175,7 @@ void draw_box(const maq_densepose_person& person, int scale, Canvas& canvas) {
 
 // Lines between keypoints of enough confidence: cool to the person's left, warm to the right, as the parts.
 void draw_skeleton(const maquette::DensePoseResult& result, uint32_t person, int scale, Canvas& canvas) {
-  constexpr float kMinConfidence = 0.3f;
+  constexpr float kMinConfidence = 0.15f;
   static constexpr Bgr kLeft = {255, 200, 60}, kRight = {70, 120, 255}, kMiddle = {255, 255, 255};
   const auto keypoints = result.keypoints(person);
   const double width = std::max(2.0, std::max(canvas.width(), canvas.height()) / 350.0);

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import onnx
 
-from export.bundle import BundleInfo
+from export.bundle import BundleInfo, read_manifest
 from export.densepose import bundle as bundle_format
 from export.densepose.config import DecodeConfig
 from export.densepose.graphs import Bundle, open_bundle
@@ -55,7 +55,7 @@ def fp32_bundle(weights: Path, folder: Path) -> Bundle:
 def prepared_graphs(source: Path, folder: Path) -> dict[str, onnx.ModelProto]:
     """The prepared float graphs of a bundle by name. folder: where they are written."""
     folder.mkdir(parents=True, exist_ok=True)
-    return {name: prepare(source / f"{name}.onnx", folder / f"{name}.onnx") for name in bundle_format.GRAPHS}
+    return {name: prepare(source / f"{name}.onnx", folder / f"{name}.onnx") for name in read_manifest(source)["graphs"]}
 
 
 def media_samples(bundle: Bundle) -> dict[str, list[Sample]]:

@@ -19,7 +19,9 @@ from tests.hostile.samples import (
 )
 from tests.hostile.trial import EITHER, REFUSED, Trial
 
-PEOPLE_RUN = ("densepose", "stub:people?size=64x48&frames=2", *DENSEPOSE[3:], "--bundle", "bundle")
+PEOPLE_RUN = (
+    "densepose", "stub:people?size=64x48&frames=2", *DENSEPOSE[3:], "--bundle", "bundle", "--keypoints",
+)  # fmt: skip
 SCENE_RUN = ("scene", "build", str(CAPTURE), "--bundle", "bundle", "--out", "a.maqs", "--threads", "1")
 HEAD_RUN = (*(word if word != str(HEADS_BUNDLE) else "bundle" for word in HEAD), "--out", "a.glb")
 NOVELTY_RUN = ("novelty", "stub:people?size=64x48&frames=3", "--json", "--bundle", "bundle",

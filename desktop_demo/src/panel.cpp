@@ -41,7 +41,6 @@ void Panel::draw_help(bool* is_open) const {
   constexpr const char* kKeys[][2] = {
       {"1 to 6", "camera, parts, U/V contours, mask, boxes, try-on"},
       {"M", "the body's surface in the corner; drag or use the arrows to turn it"},
-      {"K", "skeletons of people"},
       {"P", "pause"},
       {"F2", "snapshot: the picture, and the files of what was found in it"},
       {"F3", "clip of the picture (.mp4): begin, end"},

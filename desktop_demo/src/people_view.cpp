@@ -15,7 +15,6 @@ constexpr OwnSources kSources = {kFirstCamera, kFirstCamera, "stub:people?count=
                                  "These people are rendered; drop a photo, a clip or a recording here."};
 constexpr const char* kStages[] = {"trunk",  "proposals", "box head", "dense head", "crops",
                                    "decode", "resize",    "copy",     "wait"};
-constexpr float kMinConfidence = 0.15f;  // of a keypoint that is drawn
 
 }  // namespace
 
@@ -71,7 +70,6 @@ Action PeopleView::press(int key) {
   if (key == GLFW_KEY_A) return Action::kAddToHead;
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
-  if (key == GLFW_KEY_K) show_skeletons(model_.has_keypoints == 0);
   return LiveView::press(key);
 }
 
@@ -85,38 +83,23 @@ void PeopleView::draw(const Rect& area) {
   if (frame().number == 0) return;
   image_rect_ = area.fit(frame().camera.width_px, frame().camera.height_px);
   painter_.draw_people(view_, image_rect_);
-  if (view_ == View::kBoxes) draw_boxes();
-  if (model_.has_keypoints != 0) draw_skeletons();
+  draw_marks();
   if (!shows_mesh_) return;
   const int side = std::min(area.width, area.height) * 3 / 10;
   mesh_rect_ = {0, area.height - side, side, side};
   painter_.draw_body(mesh_rect_, yaw_, pitch_);
 }
 
-void PeopleView::draw_skeletons() const {
+void PeopleView::draw_marks() const {
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  for (uint32_t person = 0; person < frame().people.size(); ++person) {
-    std::array<float, 3> flat[MAQ_DENSEPOSE_KEYPOINT_COUNT];
-    // The frame may be of the model before, which found no keypoints.
-    if (maq_densepose_result_get_keypoints(frame().result->get(), person, flat[0].data()) != MAQ_OK) return;
-    for (const maquette::Bone& bone : maquette::kSkeleton) {
-      const auto& from = flat[bone.from];
-      const auto& to = flat[bone.to];
-      if (std::min(from[2], to[2]) < kMinConfidence) continue;
-      const ImVec2 a = on_screen(from[0], from[1]), b = on_screen(to[0], to[1]);
-      list->AddLine(a, b, IM_COL32(24, 26, 40, 255), 6 * window_.scale());
-      list->AddLine(a, b, IM_COL32(255, 255, 255, 255), 3 * window_.scale());
-    }
-  }
-}
-
-ImVec2 PeopleView::on_screen(float x_px, float y_px) const {
   const float scale = float(image_rect_.width) / float(frame().camera.width_px);
-  return {float(image_rect_.x) + x_px * scale, float(image_rect_.y) + y_px * scale};
-}
-
-void PeopleView::draw_boxes() const {
-  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const auto on_screen = [&](float x, float y) {
+    return ImVec2(float(image_rect_.x) + x * scale, float(image_rect_.y) + y * scale);
+  };
+  for (const auto& [x0, y0, x1, y1] : frame().skeletons) {
+    list->AddLine(on_screen(x0, y0), on_screen(x1, y1), IM_COL32_WHITE, 3 * window_.scale());
+  }
+  if (view_ != View::kBoxes) return;
   for (const maq_densepose_person& person : frame().people) {
     const ImVec2 from = on_screen(person.box_px[0], person.box_px[1]);
     const ImVec2 to = on_screen(person.box_px[2], person.box_px[3]);
@@ -179,17 +162,10 @@ void PeopleView::draw_views() {
     if (view % 3 != 0) ImGui::SameLine(float(view % 3) * 100 * window_.scale());
     if (ImGui::RadioButton(kViewNames[view], view_ == View(view))) view_ = View(view);
   }
-  bool shows_skeletons = model_.has_keypoints != 0;
-  if (ImGui::Checkbox("skeletons (K)", &shows_skeletons)) show_skeletons(shows_skeletons);
   ImGui::Checkbox("body surface (M)", &shows_mesh_);
   ImGui::SameLine();
   draw_pause();
   if (view_ == View::kTryOn) ImGui::TextWrapped("Drop a picture to wear it.");
-}
-
-void PeopleView::show_skeletons(bool shows) {
-  model_.has_keypoints = shows ? 1 : 0;
-  live_.set_model(model_);
 }
 
 void PeopleView::draw_model_options() {
@@ -204,6 +180,7 @@ void PeopleView::draw_model_options() {
   slider("key frames", &model_.key_frame_interval, 0, 30, model_.key_frame_interval <= 1 ? "every" : "one in %d");
   slider("long side", &model_.long_side_px, 0, 1024, model_.long_side_px == 0 ? "automatic" : "%d px");
   if (model_.long_side_px > 0) model_.long_side_px = std::max(64, model_.long_side_px);
+  changed |= ImGui::CheckboxFlags("skeletons", &model_.has_keypoints, 1);
   bool parts_alone = model_.detail == MAQ_DENSEPOSE_DETAIL_PART;
   if (ImGui::Checkbox("parts alone, no U and V", &parts_alone)) {
     model_.detail = parts_alone ? MAQ_DENSEPOSE_DETAIL_PART : MAQ_DENSEPOSE_DETAIL_SURFACE;

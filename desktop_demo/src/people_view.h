@@ -5,7 +5,6 @@
 #include <app/live_head.h>
 #include <app/mapped_frame.h>
 #include <app/triple_buffer.h>
-#include <imgui.h>
 #include <optional>
 #include <vector>
 
@@ -32,10 +31,7 @@ class PeopleView final : public LiveView {
 
  private:
   const maquette::MappedFrame& frame() const { return frames_.front(); }
-  ImVec2 on_screen(float x_px, float y_px) const;  // a point of the frame
-  void draw_skeletons() const;
-  void draw_boxes() const;
-  void show_skeletons(bool shows);  // loads the networks again
+  void draw_marks() const;  // skeletons, and in their view boxes
   void draw_views();
   void draw_model_options();
 

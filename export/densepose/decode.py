@@ -142,9 +142,7 @@ def infer(
         # A box without a body is a false alarm; one whose body is another person's already shows that person again.
         if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, iuv, instance, config):
             painted.append(k)
-    keypoint = None
-    if graphs.keypoints is not None:
-        keypoint = np.zeros((0, keypoints.COUNT, 3), np.float32)
+    keypoint = np.zeros((0, keypoints.COUNT, 3), np.float32) if graphs.keypoints else None
     if points is not None:
         keypoint = keypoints_of(points[painted], regions[painted] * to_image).numpy()
     return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance, keypoint)

@@ -158,9 +158,7 @@ class Tally:
             part = np.where(painted, comparison.shown.iuv[..., 0], 0)
             asked, right, limb, same_side = self._landmarks(part, labels, k) if labels.sure[k] else (0, 0, 0, 0)
             if self.keypoints is not None and labels.sure[k]:
-                own = (
-                    comparison.shown.keypoint[number - 1] if number and comparison.shown.keypoint is not None else None
-                )
+                own = comparison.shown.keypoint[number - 1] if number else None
                 self.keypoints.add(own, labels.point[k], labels.visible[k])
             side = shown_side(labels, int(k))
             torso = [int((part == value).sum()) for value in (BACK, CHEST)]

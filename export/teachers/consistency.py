@@ -27,7 +27,7 @@ from export.densepose.person_crop import crop_around, cut, outline, turned_box
 from export.shards import BOX_ALONE, POSSIBLE_PARTS, UNSURE
 from export.surface import MIRROR_COARSE, MIRROR_FLIPS_U, MIRROR_FLIPS_V, MIRROR_PART, PART_COUNT
 
-CROP_SIDES_PX = (256,)
+CROP_SIDES_PX = (256,)  # three sizes take an hour of a core more for 1,000 photographs
 MIN_HEIGHT_PX = 96  # smaller people are no easy view
 MIN_PROBABILITY = 0.7  # of a part, as the mean of all answers
 FINDING = DecodeConfig(long_side=480, score_threshold=0.3)  # of people whom the teachers may have missed
@@ -68,7 +68,7 @@ class Answer:
 
 
 class Consensus:
-    """Several weights, asked at several crop sizes, mirrored and not."""
+    """Several weights, asked at each of the crop sizes, mirrored and not."""
 
     def __init__(self, networks: list[MobileParsingRCNN], sides_px: tuple[int, ...] = CROP_SIDES_PX) -> None:
         self.networks, self.sides_px = networks, sides_px

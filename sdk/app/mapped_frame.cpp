@@ -1,9 +1,28 @@
 #include "app/mapped_frame.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
 namespace maquette {
+namespace {
+
+constexpr float kMinConfidence = 0.15f;  // of a keypoint that is drawn
+
+void add_skeletons(const DensePoseResult& result, std::vector<std::array<float, 4>>* lines) {
+  for (uint32_t person = 0; person < result.person_count(); ++person) {
+    std::array<float, 3> keypoints[MAQ_DENSEPOSE_KEYPOINT_COUNT];
+    // Without has_keypoints there are none.
+    if (maq_densepose_result_get_keypoints(result.get(), person, keypoints[0].data()) != MAQ_OK) return;
+    for (const Bone& bone : kSkeleton) {
+      const auto& from = keypoints[bone.from];
+      const auto& to = keypoints[bone.to];
+      if (std::min(from[2], to[2]) >= kMinConfidence) lines->push_back({from[0], from[1], to[0], to[1]});
+    }
+  }
+}
+
+}  // namespace
 
 void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
   const auto before = std::chrono::steady_clock::now();
@@ -30,6 +49,8 @@ void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint
   }
   seen = *seen_before;
   people = densepose.people();
+  skeletons.clear();
+  add_skeletons(densepose, &skeletons);
   result = std::make_shared<DensePoseResult>(std::move(densepose));
   stats = result->stats();
   number = mapped.number;

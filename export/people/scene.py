@@ -10,12 +10,14 @@ import cv2
 import numpy as np
 
 from export.camera import Camera
+from export.keypoints import COUNT
 from export.people import assets
 from export.people.animals import load_animals
 from export.people.atlas import Atlas
 from export.people.augmentation import CLOSE, Variety
 from export.people.body import Body, Shape, sample_phenotype
-from export.people.imaging import camera_faults, lens_map, through_lens
+from export.people.imaging import camera_faults, lens_map, points_through_lens, through_lens
+from export.people.landmarks import Landmarks
 from export.people.lookup import LabelLookup
 from export.people.motion import load_clips, load_photo_poses
 from export.people.panoramas import load_panoramas
@@ -33,12 +35,13 @@ _NEAR_M = 0.2  # a body's middle closer to the camera than this says nothing abo
 @dataclass(frozen=True)
 class Sample:
     """image uint8 [H, W, 3] BGR; label uint8 [H, W, 4] = (I, U*255, V*255, instance); point float32 [H, W, 3];
-    axis float32 [people, 2] by instance number - 1 (`export.shards.LabelledImage`)."""
+    axis float32 [people, 2], keypoint float32 [people, 33, 3] by instance number - 1 (`export.shards.Record`)."""
 
     image: np.ndarray
     label: np.ndarray
     point: np.ndarray | None
     axis: np.ndarray
+    keypoint: np.ndarray
 
 
 def body_axis(hips: np.ndarray, skull: np.ndarray, camera: Camera) -> np.ndarray:
@@ -69,6 +72,7 @@ class Studio:
         self.body = Body()
         atlas = Atlas(self.body)
         self.model = Model(self.body, atlas)
+        self.landmarks = Landmarks(self.body)
         backgrounds = places / "backgrounds" / split
         files = sorted(backgrounds.glob("*.jpg"))
         if not files:
@@ -102,16 +106,20 @@ class Studio:
         picture = self.renderer.draw(stage.people, stage.camera, light, rng, stage.props)
         image = composed(rng, picture, behind)
         label, point = picture.label, picture.point
+        keypoint = [self.landmarks.projected(p.vertices, stage.camera) for p in stage.people]
         if rng.random() < 0.14:
             image, label = self._occluder(rng, image, label)
         if rng.random() < 0.35:
             source = lens_map(rng, self.width, self.height)
             image = through_lens(image, source, labels=False)
             label, point = (through_lens(a, source, labels=True) for a in (label, point))
+            keypoint = [points_through_lens(at, source) for at in keypoint]
+        keypoint = [self.landmarks.seen(at, k, label, point) for k, at in enumerate(keypoint, 1)]
         point = np.where(label[..., 3:] > 0, point, 0) if self.points else None
         ends = [[p.vertices[at].mean(0) for at in (self.model.buttocks, self.model.skull)] for p in stage.people]
         axis = np.array([body_axis(*pair, stage.camera) for pair in ends], np.float32).reshape(-1, 2)
-        return Sample(camera_faults(rng, image), label, point, axis)
+        keypoint = np.array(keypoint, np.float32).reshape(-1, COUNT, 3)
+        return Sample(camera_faults(rng, image), label, point, axis, keypoint)
 
     def _background_behind(self, rng: np.random.Generator, roll_degrees: float) -> np.ndarray:
         """A photo behind people; most of the time it is tilted with them, as by a camera that is held so."""

@@ -16,6 +16,7 @@ from export.keypoints import NAMES
 from export.people.atlas import REGIONS, smooth_normals, vertex_regions
 from export.people.body import Body, sample_phenotype
 from export.people.charts import Mesh
+from export.people.landmarks import landmark_rows
 
 # Joint: (its parent, the bone whose head it turns about, prefixes of the bones that go with it). Parents come first.
 _MIDDLE = {
@@ -55,45 +56,6 @@ PARENT = tuple(JOINT.get(row[0], -1) for row in _TABLE.values())
 
 def mirrored_joint(name: str) -> str:
     return name[:-1] + {"L": "R", "R": "L"}[name[-1]] if "." in name else name
-
-
-# Landmarks that are joints: the bone whose head they are. Knuckles stand for fingers, like in BlazePose.
-_LANDMARK_BONES = {
-    "shoulder": "upperarm01", "elbow": "lowerarm01", "wrist": "wrist", "hip": "upperleg01", "knee": "lowerleg01",
-    "ankle": "foot", "index finger": "finger2-1", "little finger": "finger5-1", "thumb": "finger1-2",
-}  # fmt: skip
-
-
-def _landmark_rows(body: Body) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Landmarks as means of vertices (columns 0..V) and bone heads (from V on): [33, V + B]; which have a row [33]."""
-    vertices, regions = body.template.vertices, vertex_regions(body)
-    count = len(vertices)
-    skin = np.zeros(count, bool)
-    skin[body.groups["body"]] = True
-
-    def extreme(region: str, value: np.ndarray) -> list[int]:
-        """The body vertex of a region where `value` is greatest."""
-        own = skin & (regions[:, REGIONS.index(region)] > 0.9)
-        return [int(np.where(own, value, -np.inf).argmax())]
-
-    x, y, z = vertices.T
-    rows = {"nose": extreme("head", -y - 100 * (np.abs(x) > 0.005))}
-    for side, sign in (("left", 1), ("right", -1)):
-        letter = side[0]
-        rows[f"{side} eye"] = list(body.groups[f"helper-{letter}-eye"])
-        rows[f"{side} ear"] = extreme("head", sign * x)
-        rows[f"{side} toe"] = extreme("foot", -y - 100 * (sign * x < 0))
-        rows[f"{side} heel"] = extreme("foot", y - z - 100 * (sign * x < 0))
-        for landmark, bone in _LANDMARK_BONES.items():
-            rows[f"{side} {landmark}"] = [count + body.bone[f"{bone}.{letter.upper()}"]]
-        # BlazePose's shoulders lie between the joint and the skin above it.
-        joint = body.template.heads[body.bone[f"upperarm01.{letter.upper()}"]]
-        above = np.where(skin & (np.linalg.norm(vertices[:, :2] - joint[:2], axis=1) < 0.02), z, -np.inf)
-        rows[f"{side} shoulder"].append(int(above.argmax()))
-    matrix = sp.lil_matrix((len(NAMES), count + len(body.bones)))
-    for name, columns in rows.items():
-        matrix[NAMES.index(name), columns] = 1 / len(columns)
-    return matrix.tocsr(), np.array([name in rows for name in NAMES])
 
 
 @dataclass(frozen=True)
@@ -156,10 +118,13 @@ class Puppet:
         # Fingers and toes have too many vertices for what they tell: spread by distance.
         self.sample_index = skin[_spread(mean[skin], samples)]
         self.sample, self.whole = pieces(self.sample_index), pieces(np.arange(count))
-        matrix, self.has_landmark = _landmark_rows(body)
-        template = np.concatenate([body.template.vertices, body.template.heads])
-        self.template_nose = (matrix @ template)[NAMES.index("nose")]
-        self.landmarks = pieces(matrix)
+        matrix = landmark_rows(body)
+        # Corners of the eyes and the mouth say little about the pose of a body.
+        self.has_landmark = np.array(
+            [not name.startswith("mouth") and len(name.split()) < 3 or "finger" in name for name in NAMES]
+        )
+        self.template_nose = (matrix @ body.template.vertices)[NAMES.index("nose")]
+        self.landmarks = pieces(sp.hstack([matrix, sp.csr_matrix((len(NAMES), len(body.bones)))]).tocsr())
         heads = count + np.array([body.bone[row[1]] for row in _TABLE.values()])
         joints = pieces(heads)
         self.joint_rest, self.joint_basis = joints.rest, joints.basis

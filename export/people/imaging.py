@@ -27,13 +27,15 @@ def through_lens(image: np.ndarray, source: np.ndarray, labels: bool) -> np.ndar
 
 
 def points_through_lens(points: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """Where an image through `lens_map` shows points [N, 2], which its source shows at `points`; pixel k covers
-    [k, k + 1). The map is smooth and near the identity: a few steps of a fixed-point iteration invert it. Points outside
-    of the image are moved as the nearest pixel is."""
+    """Where an image through `lens_map` shows what its source shows at `points` [N, 2]; pixel k covers [k, k + 1).
+
+    The map is smooth and near the identity: a few steps of a fixed-point iteration invert it. Points outside of the
+    image are moved as the nearest pixel is.
+    """
     height, width = source.shape[:2]
     moved = np.array(points, np.float64)
     for _ in range(8):
-        x, y = (np.clip(np.nan_to_num(np.floor(c)), 0, n - 1).astype(int) for c, n in zip(moved.T, (width, height)))
+        x, y = np.clip(np.nan_to_num(np.floor(moved)), 0, (width - 1, height - 1)).astype(int).T
         moved = points - (source[y, x] - np.stack([x, y], -1))
     return moved
 

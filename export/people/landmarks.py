@@ -74,16 +74,16 @@ class Landmarks:
         self._reach = np.select([face, trunk], [0.04, 0.2], 0.12)
 
     def projected(self, vertices: np.ndarray, camera: Camera) -> np.ndarray:
-        """The keypoints of a body with `vertices` [V, 3] in the image [33, 2], where pixel k covers [k, k + 1); NaN behind
-        the camera."""
+        """Where the image shows the keypoints of a body with `vertices` [V, 3]: [33, 2], pixel k covers [k, k + 1). NaN
+        behind the camera."""
         at, depth = camera.projected(self._rows @ vertices)
         return np.where(depth[:, None] > _NEAR_M, at + 0.5, np.nan)
 
     def seen(self, at: np.ndarray, number: int, label: np.ndarray, point: np.ndarray) -> np.ndarray:
         """Keypoints [33, 3] of person `number`, as `export.shards.Record` has them.
 
-        at: as of `projected`; label: uint8 [H, W, 4]; point [H, W, 3] of the template's surface. A keypoint is shown (1)
-        where the image shows the person's surface near it, else hidden (0): behind others, things or the own body.
+        at: as of `projected`; label: uint8 [H, W, 4]; point [H, W, 3] of the template's surface. A keypoint is shown
+        (1) where the image shows the person's surface near it, else hidden (0) by others, things or the own body.
         """
         height, width = label.shape[:2]
         x, y = np.nan_to_num(np.floor(at), nan=-1).astype(int).T

@@ -121,7 +121,7 @@ class Puppet:
         matrix = landmark_rows(body)
         # Corners of the eyes and the mouth say little about the pose of a body.
         self.has_landmark = np.array(
-            [not name.startswith("mouth") and len(name.split()) < 3 or "finger" in name for name in NAMES]
+            [not name.startswith("mouth") and not name.endswith(("inner", "outer")) for name in NAMES]
         )
         self.template_nose = (matrix @ body.template.vertices)[NAMES.index("nose")]
         self.landmarks = pieces(sp.hstack([matrix, sp.csr_matrix((len(NAMES), len(body.bones)))]).tocsr())

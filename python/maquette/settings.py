@@ -114,6 +114,10 @@ class DensePoseSettings(ModelSettings, total=False):
     """1: keypoints of each person are found (maq_densepose_result_get_keypoints), for about a millisecond a person; 0
     (default): they are not."""
 
+    steadiness: float
+    """In a stream: how much the frames before count for parts, U and V, up to 0.95; 0 (default): 0.8; -1: not at all.
+    Larger values flicker less."""
+
 
 class EdgesSettings(ModelSettings, total=False):
     """Fields of maq_edges_config."""

@@ -37,8 +37,8 @@ typedef enum maq_densepose_crops {
 /* Options. 0 is the default in every field; `model` has its own (types.h).
  *
  * Frames with a `sequence` above 0, and all frames with key_frame_interval above 1, are frames of a stream. In a
- * stream, a person who hardly moves is seen through the same pixels in each frame. A label stays until another one is
- * clearly more likely. */
+ * stream, a person who hardly moves is seen through the same pixels in each frame, and the surface is averaged over
+ * the frames along the motion of people (`steadiness`). */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
   maq_model_options model;     /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */
@@ -65,6 +65,8 @@ typedef struct maq_densepose_config {
   uint32_t result_pool_size;        /* results the app may hold at once, 1 to 64; 0 (default): 4 */
   int32_t has_keypoints;            /* 1: keypoints of each person are found (maq_densepose_result_get_keypoints), for
                                        about a millisecond a person; 0 (default): they are not */
+  float steadiness;                 /* in a stream: how much the frames before count for parts, U and V, up to 0.95;
+                                       0 (default): 0.8; -1: not at all. Larger values flicker less. */
 } maq_densepose_config;
 
 typedef struct maq_densepose_person {

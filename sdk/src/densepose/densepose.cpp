@@ -70,6 +70,7 @@ DensePose::DensePose(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const Bu
       cancel_(std::make_unique<RunCancel>(runtime)),
       surface_(spec_.surface_file.empty() ? std::vector<uint8_t>() : bundle.files.at(spec_.surface_file),
                bundle.path_of(spec_.surface_file)),
+      steady_surface_(settings_.steadiness),
       tracker_(size_t(settings_.max_people)) {
   SessionSettings on_provider;
   on_provider.threads = settings_.threads;
@@ -114,7 +115,7 @@ void DensePose::forget_frame() {
   tracked_.clear();
   tracks_crops_ = false;
   scales_.reset();
-  steady_labels_.begin(false);
+  is_forgotten_ = true;
 }
 
 void DensePose::set_quality(int key_frame_interval, int long_side_px) {
@@ -132,7 +133,8 @@ void DensePose::begin_frame(const ImageView& image, DensePoseStats& stats) {
     scales_.reset();
     tracked_.clear();
   }
-  steady_labels_.begin(is_stream_ && is_same_stream);
+  steady_surface_.begin(image, is_stream_ && is_same_stream && !is_forgotten_);
+  is_forgotten_ = false;
   image_width_px_ = image.width_px;
   image_height_px_ = image.height_px;
   roll_steps_ = roll_steps;
@@ -343,7 +345,8 @@ void DensePose::paint_people(DensePoseResult& result) {
     const PersonCrop* const view = person.crop ? &*person.crop : person.first_view ? &*person.first_view : nullptr;
     const AffineMap to_cells =
         view != nullptr ? view->to_cells(logits.size) : map_of_cells(person.region, logits.size).inverse();
-    steady_labels_.favour(to_cells, logits, person.answer.labels);
+    steady_surface_.steady(to_cells, logits, person.answer.labels, person.answer.surface,
+                           person.mapper->chart_channels());
     const DecodeCounts counts = view != nullptr
                                     ? paint_rotated_person(logits, to_cells, number, spec.mask_threshold,
                                                            spec.min_visible_fraction, decode_memory_, result.planes)
@@ -353,7 +356,6 @@ void DensePose::paint_people(DensePoseResult& result) {
     result.stats.decoded.clamped_uv += counts.clamped_uv;
     // A box without a body is a false alarm; a box whose body is painted already shows the same person again.
     if (counts.body_pixels == 0) continue;
-    steady_labels_.keep(to_cells, spec.mask_threshold, decode_memory_);
     if (view != nullptr) {
       Box body = person_bounds(logits.size, to_cells.inverse(), spec.mask_threshold, decode_memory_);
       clip_box(body, float(result.planes.width_px), float(result.planes.height_px));

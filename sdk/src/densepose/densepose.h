@@ -15,7 +15,7 @@
 #include "densepose/frame_budget.h"
 #include "densepose/keypoints/keypoint_finder.h"
 #include "densepose/surface/dense_decode.h"
-#include "densepose/surface/steady_labels.h"
+#include "densepose/surface/steady_surface.h"
 #include "densepose/surface/surface_grid.h"
 #include "densepose/surface/surface_mapper.h"
 #include "densepose/tracking/person_tracker.h"
@@ -142,7 +142,7 @@ class DensePose {
   // Scratch of a frame, kept so that the next one takes nothing from the heap.
   std::vector<MappedPerson> mapped_;
   DecodeMemory decode_memory_;
-  SteadyLabels steady_labels_;
+  SteadySurface steady_surface_;
   // People of the previous frame, to be followed: by their boxes or, if all have crops, in the crops alone.
   std::vector<MappedPerson> tracked_;
   std::vector<ScoredBox> tracked_boxes_;
@@ -152,6 +152,7 @@ class DensePose {
   PersonTracker tracker_;
   std::vector<Box> painted_boxes_;
   bool tracks_crops_ = false;
+  bool is_forgotten_ = false;  // the previous frame
   int image_width_px_ = 0, image_height_px_ = 0;
   int frames_since_key_ = 0;
   bool is_stream_ = false;  // the image follows the previous one

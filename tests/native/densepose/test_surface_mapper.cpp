@@ -58,7 +58,7 @@ TEST_F(SurfaceMapper, LogitsDescribeTheAnswerAlsoOfACopy) {
             size_t(logits.size * logits.size) * size_t(logits.coarse_classes + logits.index_classes));
   const maq::ChartPoint point = logits.charts->at(3, 5, 7);
   std::vector<float> labels_copy(answer.labels, answer.labels + mapper_.labels_size());
-  const std::vector<float> surface_copy(answer.surface, answer.surface + mapper_.surface_size());
+  std::vector<float> surface_copy(answer.surface, answer.surface + mapper_.surface_size());
   const maq::DenseLogits copied = mapper_.logits_of({labels_copy.data(), surface_copy.data()});
   EXPECT_EQ(copied.charts->at(3, 5, 7).u, point.u);
   EXPECT_EQ(copied.charts->at(3, 5, 7).v, point.v);

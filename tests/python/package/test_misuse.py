@@ -40,7 +40,7 @@ OUT_OF_RANGE = {
         "long_side_px": (31, 2049), "score_threshold": (1.5, -0.1, NAN), "max_people": (256,), "max_proposals": (1001,),
         "result_pool_size": (65,), "key_frame_interval": (-1,), "min_person_height_px": (-1,), "detail": (2,),
         "person_crops": (4,), "preset": (2,), "person_crop_px": (63, 513),
-        "has_keypoints": (2, -1)},
+        "has_keypoints": (2, -1), "steadiness": (-0.5, -2, 0.96, NAN)},
     "maq_edges_create": {"result_pool_size": (65,), "average_frames": (-1, 65)},
     "maq_edges_result_find_curves": {
         "min_length_px": (3, 2e6, NAN), "skip_boxes": (2, -1), "focal_tolerance": (-0.1, 0.6, NAN)},

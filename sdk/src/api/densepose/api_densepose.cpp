@@ -66,6 +66,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
                 int32_t(MAQ_DENSEPOSE_CROPS_OFF));
   if (config.person_crop_px != 0) require_range(field("person_crop_px"), config.person_crop_px, 64, 512);
   require_range(field("has_keypoints"), config.has_keypoints, 0, 1);
+  if (config.steadiness != -1) require_range(field("steadiness"), config.steadiness, 0.0f, 0.95f);
   DensePoseSettings settings;
   settings.threads = config.model.threads != 0 ? config.model.threads : default_threads();
   settings.long_side_px = config.long_side_px;
@@ -73,6 +74,7 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   settings.max_people = config.max_people;
   settings.max_proposals = config.max_proposals;
   settings.key_frame_interval = std::max(config.key_frame_interval, 1);
+  if (config.steadiness != 0) settings.steadiness = std::max(config.steadiness, 0.0f);
   settings.min_person_height_px = config.min_person_height_px;
   settings.surface = config.detail == MAQ_DENSEPOSE_DETAIL_SURFACE;
   settings.crops = crops_of(config);

@@ -40,7 +40,7 @@ void SurfaceMapper::run(RunCancel& cancel) {
   shapes_[1][3] = charts_.channels();
   const std::vector<TensorView>& answers = dense_head_->run(inputs_, shapes_, &cancel);
   labels_ = const_cast<float*>(answers[0].data);  // ours until the next run
-  surface_ = answers[1].data;
+  surface_ = const_cast<float*>(answers[1].data);
 }
 
 SurfaceAnswer SurfaceMapper::answer(size_t index) const {

@@ -16,8 +16,8 @@ namespace maq {
 
 // The output of the dense head for one person.
 struct SurfaceAnswer {
-  float* labels = nullptr;         // nullptr: there is none yet
-  const float* surface = nullptr;  // features of U and V
+  float* labels = nullptr;   // nullptr: there is none yet
+  float* surface = nullptr;  // features of U and V
 };
 
 class SurfaceMapper {
@@ -55,7 +55,7 @@ class SurfaceMapper {
   std::vector<float> rois_;
   size_t count_ = 0;
   float* labels_ = nullptr;
-  const float* surface_ = nullptr;
+  float* surface_ = nullptr;
   std::vector<TensorView> inputs_;
   std::vector<Shape> shapes_;
 };

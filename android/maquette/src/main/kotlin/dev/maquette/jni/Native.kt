@@ -322,7 +322,7 @@ internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32
     val bundle_files get() = Pointer(this, 24)
 }
 
-internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
+internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {
     val model = maq_model_options(this, 8); var preset: Int get() = int(40); set(v) = int(40, v)
     var long_side_px: Int get() = int(44); set(v) = int(44, v)
     var score_threshold: Float get() = float(48); set(v) = float(48, v)
@@ -334,6 +334,7 @@ internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct
     var person_crop_px: Int get() = int(76); set(v) = int(76, v)
     var result_pool_size: Int get() = int(80); set(v) = int(80, v)
     var has_keypoints: Int get() = int(84); set(v) = int(84, v)
+    var steadiness: Float get() = float(88); set(v) = float(88, v)
 }
 
 internal class maq_densepose_model_stats(outer: Memory? = null, at: Int = 0) : Struct(12, outer, at) {

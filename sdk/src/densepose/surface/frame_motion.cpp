@@ -1,0 +1,163 @@
+#include "densepose/surface/frame_motion.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "core/simd_clones.h"
+
+namespace maq {
+namespace {
+
+constexpr int kLongSide = 320;  // of the fine level, at most; the coarse level has half of it
+constexpr int kBlock = 8;       // side of a block, in pixels of the fine level
+// Half of the side of the window around a block's middle that is compared, and how far it is looked for, at each level.
+constexpr int kFineHalf = 8, kFineReach = 1, kCoarseHalf = 4, kCoarseReach = 6;
+// A block has moved if that fits better than rest by so much a pixel: noise moves nothing.
+constexpr int kMinGain = 1;
+constexpr int kOutside = 1 << 24;  // more than any difference
+
+// The bytes that tell the brightness of pixels: Y, the grey value or green. No first byte: a depth image.
+struct Bright {
+  const uint8_t* first;
+  size_t stride, step;
+};
+
+Bright brightness_of(const ImageView& image) {
+  const PlaneView& plane = image.planes[0];
+  const auto bytes = [&](size_t first, size_t step) { return Bright{plane.data + first, plane.stride_bytes, step}; };
+  switch (image.format) {
+    case MAQ_PIXEL_RGB8:
+    case MAQ_PIXEL_BGR8: return bytes(1, 3);
+    case MAQ_PIXEL_RGBA8: return bytes(1, 4);
+    case MAQ_PIXEL_YUYV: return bytes(0, 2);
+    case MAQ_PIXEL_NV12:
+    case MAQ_PIXEL_GREY8: return bytes(0, 1);
+    default: return {nullptr, 0, 0};
+  }
+}
+
+uint8_t mean(int a, int b, int c, int d) { return uint8_t((a + b + c + d + 2) / 4); }
+
+// The sum of absolute differences of two windows, given by their middles.
+MAQ_SIMD_CLONES int difference(const uint8_t* a, const uint8_t* b, int stride, int half) {
+  int sum = 0;
+  for (int y = -half; y < half; ++y) {
+    const uint8_t* const p = a + ptrdiff_t(y) * stride - half;
+    const uint8_t* const q = b + ptrdiff_t(y) * stride - half;
+    for (int x = 0; x < 2 * half; ++x) sum += std::abs(int(p[x]) - int(q[x]));
+  }
+  return sum;
+}
+
+// Where between -0.5 and 0.5 the parabola through three values has its minimum; 0 without any.
+float minimum_between(int before, int middle, int after) {
+  const int curve = before - 2 * middle + after;
+  return curve > 0 ? std::clamp(0.5f * float(before - after) / float(curve), -0.5f, 0.5f) : 0.0f;
+}
+
+}  // namespace
+
+void FrameMotion::next(const ImageView& image, bool follows_last) {
+  const Bright bright = brightness_of(image);
+  const bool is_same_size = image.width_px == image_width_px_ && image.height_px == image_height_px_;
+  image_width_px_ = image.width_px;
+  image_height_px_ = image.height_px;
+  step_ = std::max(1, (std::max(image.width_px, image.height_px) + kLongSide - 1) / kLongSide);
+  std::swap(now_, before_);
+
+  Level& fine = now_.fine;
+  const bool is_depth = bright.first == nullptr;
+  fine.width = is_depth ? 0 : image.width_px / step_ / 2 * 2;
+  fine.height = is_depth ? 0 : image.height_px / step_ / 2 * 2;
+  fine.values.resize(size_t(fine.width) * size_t(fine.height));
+  const size_t right = size_t(step_ / 2) * bright.step, down = size_t(step_ / 2) * bright.stride;
+  for (int y = 0; y < fine.height; ++y) {
+    const uint8_t* at = bright.first + size_t(y * step_) * bright.stride;
+    uint8_t* const out = fine.values.data() + size_t(y) * size_t(fine.width);
+    for (int x = 0; x < fine.width; ++x, at += size_t(step_) * bright.step)
+      out[x] = mean(at[0], at[right], at[down], at[down + right]);
+  }
+  Level& coarse = now_.coarse;
+  coarse.width = fine.width / 2;
+  coarse.height = fine.height / 2;
+  coarse.values.resize(size_t(coarse.width) * size_t(coarse.height));
+  for (int y = 0; y < coarse.height; ++y) {
+    const uint8_t* const upper = fine.values.data() + size_t(2 * y) * size_t(fine.width);
+    const uint8_t* const lower = upper + fine.width;
+    uint8_t* const out = coarse.values.data() + size_t(y) * size_t(coarse.width);
+    for (int x = 0; x < coarse.width; ++x)
+      out[x] = mean(upper[2 * x], upper[2 * x + 1], lower[2 * x], lower[2 * x + 1]);
+  }
+
+  is_known_ = follows_last && is_same_size && before_.fine.values.size() == fine.values.size() &&
+              std::min(fine.width, fine.height) >= 2 * kFineHalf;
+  columns_ = (fine.width + kBlock - 1) / kBlock;
+  rows_ = (fine.height + kBlock - 1) / kBlock;
+  blocks_.resize(size_t(columns_) * size_t(rows_));
+  is_matched_.assign(blocks_.size(), 0);
+}
+
+const FrameMotion::Motion& FrameMotion::at(const Point& point) {
+  const auto block = [&](double px, int count) {
+    return int(std::clamp(px / (step_ * kBlock), 0.0, double(count - 1)));
+  };
+  const int column = block(point.x, columns_), row = block(point.y, rows_);
+  const size_t index = size_t(row) * size_t(columns_) + size_t(column);
+  if (is_matched_[index] == 0) {
+    blocks_[index] = matched(column, row);
+    is_matched_[index] = 1;
+  }
+  return blocks_[index];
+}
+
+FrameMotion::Motion FrameMotion::matched(int column, int row) const {
+  // A window of one level, as near to the block as it fits, against the frame before.
+  struct Window {
+    const Level &now, &before;
+    int half, x, y;
+
+    Window(const Level& level_now, const Level& level_before, int window_half, int middle_x, int middle_y)
+        : now(level_now),
+          before(level_before),
+          half(window_half),
+          x(std::clamp(middle_x, half, now.width - half)),
+          y(std::clamp(middle_y, half, now.height - half)) {}
+
+    // From where it would have come by that motion; kOutside if it was not in the frame.
+    int difference_by(int dx, int dy) const {
+      const int from_x = x - dx, from_y = y - dy;
+      if (from_x < half || from_y < half || from_x > before.width - half || from_y > before.height - half)
+        return kOutside;
+      return difference(now.values.data() + ptrdiff_t(y) * now.width + x,
+                        before.values.data() + ptrdiff_t(from_y) * before.width + from_x, now.width, half);
+    }
+    int pixels() const { return 4 * half * half; }
+    // The best motion within `reach` of `around`, if it is clearly better than rest.
+    Vector best(Vector around, int reach) const {
+      Vector best_motion;
+      int least = difference_by(0, 0) - kMinGain * pixels();
+      for (int dy = around.y - reach; dy <= around.y + reach; ++dy) {
+        for (int dx = around.x - reach; dx <= around.x + reach; ++dx) {
+          const int sum = difference_by(dx, dy);
+          if (sum < least) least = sum, best_motion = {dx, dy};
+        }
+      }
+      return best_motion;
+    }
+  };
+  const int x = column * kBlock + kBlock / 2, y = row * kBlock + kBlock / 2;
+  const Vector rough = Window(now_.coarse, before_.coarse, kCoarseHalf, x / 2, y / 2).best({}, kCoarseReach);
+  const Window fine(now_.fine, before_.fine, kFineHalf, x, y);
+  const Vector motion = fine.best({2 * rough.x, 2 * rough.y}, kFineReach);
+  const int least = fine.difference_by(motion.x, motion.y);
+  float rest_x = 0, rest_y = 0;
+  if (motion.x != 0 || motion.y != 0) {
+    const auto beside = [&](int dx, int dy) { return fine.difference_by(motion.x + dx, motion.y + dy); };
+    rest_x = minimum_between(beside(-1, 0), least, beside(1, 0));
+    rest_y = minimum_between(beside(0, -1), least, beside(0, 1));
+  }
+  return {(float(motion.x) + rest_x) * float(step_), (float(motion.y) + rest_y) * float(step_),
+          float(least) / float(fine.pixels())};
+}
+
+}  // namespace maq

@@ -1,4 +1,4 @@
-"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes, edges, heads and prediction over numpy arrays.
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, bodies, scenes, edges, heads and prediction over numpy arrays.
 
     import maquette
     result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from maquette.bodies import BODY_ANGLES, Body, BodyClip, BodyMesh, BodyPerson, BodyResult
 from maquette.densepose import (
     COCO_KEYPOINTS,
     KEYPOINTS,
@@ -59,8 +60,8 @@ from maquette.sources import (
 )
 
 __all__ = [
-    "COCO_KEYPOINTS", "KEYPOINTS",
-    "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
+    "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS",
+    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
     "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
     "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
     "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",

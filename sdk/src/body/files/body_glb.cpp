@@ -55,14 +55,13 @@ class PersonWriter {
     }
   }
 
+  // The mesh is beside the skeleton, not above or below it: only the skeleton moves it.
   void write(size_t number) {
-    const size_t root = lists_.node_count, mesh_node = root + 1, first_joint = root + 2;
+    const size_t mesh_node = lists_.node_count, first_joint = mesh_node + 1;
     write_mesh();
     write_skin(first_joint);
-    append(lists_.roots, std::to_string(root));
-    append(lists_.nodes,
-           concatenate("{\"name\":\"person_", number + 1, "\",\"children\":[", mesh_node, ',', first_joint, "]}"));
-    append(lists_.nodes, concatenate("{\"name\":\"body_", number + 1, "\",\"mesh\":", lists_.mesh_count,
+    append(lists_.roots, concatenate(mesh_node, ',', first_joint));
+    append(lists_.nodes, concatenate("{\"name\":\"person_", number + 1, "\",\"mesh\":", lists_.mesh_count,
                                      ",\"skin\":", lists_.mesh_count, '}'));
     for (size_t j = 0; j < rest_.size(); ++j) append(lists_.nodes, joint_node(j, first_joint));
     lists_.node_count = first_joint + rest_.size();

@@ -158,6 +158,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, help="only the first N of each clip")
     parser.add_argument("--least-pixels", type=int, default=600)
     parser.add_argument("--labels", choices=("true", "network", "both"), default="both")
+    parser.add_argument("--preset", choices=("stream", "photo"), default="stream", help="of dense pose")
     parser.add_argument("--no-intrinsics", dest="intrinsics", action="store_false", help="weak perspective")
     parser.add_argument("--no-keypoints", dest="keypoints", action="store_false", help="the surface alone")
     parser.add_argument("--cold", dest="warm", action="store_false", help="every frame for itself")
@@ -168,7 +169,9 @@ def main() -> None:
     body = maquette.Body(options.bundle)
     rows = {}
     for kind in ("true", "network") if options.labels == "both" else (options.labels,):
-        densepose = maquette.DensePose(options.densepose, has_keypoints=True) if kind == "network" else None
+        densepose = None
+        if kind == "network":
+            densepose = maquette.DensePose(options.densepose, has_keypoints=True, preset=options.preset)
         found: list[Answer] = []
         for path in clip_paths(options.clips):
             clip = read_clip(path)

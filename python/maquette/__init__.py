@@ -1,4 +1,4 @@
-"""Maquette: a camera into 3D on two CPU cores. Dense pose, bodies, scenes, edges, heads and prediction over numpy arrays.
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, bodies, scenes, edges, heads and prediction over numpy.
 
     import maquette
     result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
@@ -61,13 +61,14 @@ from maquette.sources import (
 
 __all__ = [
     "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS",
-    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
-    "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
-    "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
-    "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",
-    "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder",
-    "Scene", "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path",
-    "list_cameras", "list_source_schemes", "part_colours", "part_name", "sample",
+    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "Box", "Camera", "CameraMode", "Capture",
+    "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose", "DensePoseModel", "DensePoseResult",
+    "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark",
+    "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget",
+    "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult",
+    "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder", "Scene", "SceneBuilder",
+    "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
+    "list_source_schemes", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

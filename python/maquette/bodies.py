@@ -43,7 +43,7 @@ class BodyPerson:
     joint_rotations: float32 [J, 3], rotation vectors relative to the parent, radians. orientation: float32 [3, 3], body
     axes (x left, y back, z up) to camera axes. shape: float32 [S]. angles_deg: by the names of `BODY_ANGLES`.
     pelvis_m: float32 [3], its place in the camera; None without intrinsics. pelvis_px, scale_px_per_m: where the image
-    shows it. seen_joints: bool [J], False for joints that follow the prior. inlier_fraction, error_px: how well it fits.
+    shows it. seen_joints: bool [J], False for joints that follow the prior. inlier_fraction, error_px: quality.
     """
 
     id: int
@@ -102,9 +102,7 @@ class Body(NativeObject):
             mesh.shape_count,
         )
 
-    def run(
-        self, people: DensePoseResult, intrinsics: Intrinsics | None = None, timestamp_ns: int = 0
-    ) -> BodyResult:
+    def run(self, people: DensePoseResult, intrinsics: Intrinsics | None = None, timestamp_ns: int = 0) -> BodyResult:
         """people: of `DensePose.run`. intrinsics: of the camera; None: unknown. timestamp_ns: of the frame; with it and
         the people's ids, each fit starts from the body in the frame before. Raises MaquetteError."""
         ids = [person.id for person in people.people]
@@ -128,7 +126,9 @@ class Body(NativeObject):
         if iuv.ndim != 3 or iuv.shape[2] != 3 or person.shape != iuv.shape[:2]:
             raise ValueError(f"iuv has the shape {iuv.shape} and person {person.shape}; pass [H, W, 3] and [H, W].")
         if keypoints is not None and keypoints.shape != (len(ids), len(KEYPOINTS), 3):
-            raise ValueError(f"keypoints have the shape {keypoints.shape}, but must be {(len(ids), len(KEYPOINTS), 3)}.")
+            raise ValueError(
+                f"keypoints have the shape {keypoints.shape}, but must be {(len(ids), len(KEYPOINTS), 3)}."
+            )
         given = n.ffi.new("maq_body_input *")
         n.call("maq_body_input_init", given, n.ffi.sizeof("maq_body_input"))
         given.height_px, given.width_px = person.shape

@@ -16,7 +16,7 @@ from export.surface import PART_COUNT
 MAGIC, VERSION = b"MAQBOD\r\n", 1
 FILE = "body.maqb"
 POINT_STEP_M = 5e-5
-_SHARES = 255  # skin weights and shares of a triangle's vertices are steps of 1 / 255
+_FRACTIONS = 255  # skin weights and fractions of a triangle's vertices are steps of 1 / 255
 _LARGEST = 32767
 HEAD = np.dtype(
     [
@@ -44,12 +44,12 @@ def _steps(values: np.ndarray, step: np.ndarray | float) -> bytes:
     return steps.astype("<i2").tobytes()
 
 
-def whole_shares(shares: np.ndarray) -> np.ndarray:
+def whole_fractions(fractions: np.ndarray) -> np.ndarray:
     """Shares [K, W] that sum to 1, as whole numbers that sum to 255: the largest remainders are rounded up."""
-    exact = shares * _SHARES
+    exact = fractions * _FRACTIONS
     low = np.floor(exact).astype(int)
     rank = np.argsort(np.argsort(low - exact, axis=1, kind="stable"), axis=1)
-    return (low + (rank < _SHARES - low.sum(1, keepdims=True))).astype("u1")
+    return (low + (rank < _FRACTIONS - low.sum(1, keepdims=True))).astype("u1")
 
 
 def body_bytes(model: BodyModel) -> bytes:
@@ -62,17 +62,17 @@ def body_bytes(model: BodyModel) -> bytes:
     basis_step = (reach / _LARGEST).astype("<f4").astype(np.float64) * (1 + 1e-6)
     basis_step = basis_step.astype("<f4")
     each = basis_step.astype(np.float64)[:, None, None]
-    triple = np.concatenate([model.surface_share, 1 - model.surface_share.sum(-1, keepdims=True)], -1)
-    shares = whole_shares(triple.reshape(-1, 3))[:, :2]
-    shares[model.surface_triangle.ravel() == NOWHERE] = 0
+    triple = np.concatenate([model.surface_fraction, 1 - model.surface_fraction.sum(-1, keepdims=True)], -1)
+    fractions = whole_fractions(triple.reshape(-1, 3))[:, :2]
+    fractions[model.surface_triangle.ravel() == NOWHERE] = 0
     parts = [basis_step.tobytes()]
     for name, parent in zip(model.joints, model.parents, strict=True):
         parts += [bytes([len(name.encode())]), name.encode(), np.int8(parent).tobytes()]
     parts += [_steps(model.joint_rest, POINT_STEP_M), _steps(model.joint_basis, each)]
     parts += [_steps(model.rest, POINT_STEP_M), _steps(model.basis, each)]
-    parts += [model.weight_joints.astype("u1").tobytes(), whole_shares(model.weights).tobytes()]
+    parts += [model.weight_joints.astype("u1").tobytes(), whole_fractions(model.weights).tobytes()]
     parts += [model.triangles.astype("<u2").tobytes()]
-    parts += [model.surface_triangle.astype("<u2").tobytes(), shares.tobytes()]
+    parts += [model.surface_triangle.astype("<u2").tobytes(), fractions.tobytes()]
     prior = model.prior
     parts += [np.asarray(a, "<f4").tobytes() for a in (prior.mean, prior.low, prior.high, prior.precision)]
     return signed(head, MAGIC, VERSION, b"".join(parts))
@@ -110,17 +110,17 @@ def body_from_bytes(data: bytes, name: str = "The body in memory") -> BodyModel:
     joint_rest, joint_basis = read.take("<i2", joints, 3) * step, read.take("<i2", shapes, joints, 3) * each
     points = vertices + keypoints
     rest, basis = read.take("<i2", points, 3) * step, read.take("<i2", shapes, points, 3) * each
-    weight_joints, weights = read.take("u1", points, WEIGHTS).astype(int), read.take("u1", points, WEIGHTS) / _SHARES
+    weight_joints, weights = read.take("u1", points, WEIGHTS).astype(int), read.take("u1", points, WEIGHTS) / _FRACTIONS
     faces = read.take("<u2", triangles, 3).astype(int)
     surface = read.take("<u2", PART_COUNT, nodes, nodes).astype(int)
-    share = read.take("u1", PART_COUNT, nodes, nodes, 2) / _SHARES
+    fraction = read.take("u1", PART_COUNT, nodes, nodes, 2) / _FRACTIONS
     angles = 3 * (joints - 1)
     mean, low, high = (read.take("<f4", angles).astype(np.float64) for _ in range(3))
     prior = PosePrior(mean, read.take("<f4", angles, angles).astype(np.float64), low, high)
     if read.at != len(data):
         raise BodyFileError(f"{name} has {len(data) - read.at} bytes that belong to nothing.")
     return BodyModel(tuple(names), NAMES[:keypoints], np.array(parents), joint_rest, joint_basis, rest, basis,
-                     weight_joints, weights, faces, surface, share, prior)  # fmt: skip
+                     weight_joints, weights, faces, surface, fraction, prior)  # fmt: skip
 
 
 def read_body(path: Path) -> BodyModel:

@@ -27,8 +27,8 @@ class BodyModel:
 
     joints: names; parents [19], -1 of the first; joint_rest [19, 3], joint_basis [S, 19, 3]; rest [V + K, 3], basis
     [S, V + K, 3] (a standard deviation each); weight_joints, weights [V + K, 4], sum 1; triangles [F, 3] of vertices;
-    surface_triangle [24, n, n] (NOWHERE: none) and surface_share [24, n, n, 2], the shares of the triangle's first
-    and second vertex, at U = i / (n - 1), V = j / (n - 1); prior of the pose.
+    surface_triangle [24, n, n] (NOWHERE: none) and surface_fraction [24, n, n, 2], the fractions of the triangle's
+    first and second vertex, at U = i / (n - 1), V = j / (n - 1); prior of the pose.
     """
 
     joints: tuple[str, ...]
@@ -42,7 +42,7 @@ class BodyModel:
     weights: np.ndarray
     triangles: np.ndarray
     surface_triangle: np.ndarray
-    surface_share: np.ndarray
+    surface_fraction: np.ndarray
     prior: PosePrior
 
     @property
@@ -58,7 +58,7 @@ def heaviest(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def nearest_on_triangles(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """points [K, 3], corners [F, 3, 3]. For each point the nearest triangle [K], the shares of its three vertices
+    """points [K, 3], corners [F, 3, 3]. For each point the nearest triangle [K], the fractions of its three vertices
     [K, 3] and the distance [K] (Ericson, "Real-time collision detection", 5.1.5)."""
     tree = cKDTree(corners.mean(1))
     candidates = tree.query(points, k=min(_NEAR_TRIANGLES, len(corners)))[1]
@@ -76,16 +76,16 @@ def nearest_on_triangles(points: np.ndarray, corners: np.ndarray) -> tuple[np.nd
     t_ab, t_ac, t_bc = on_edge(a, ab), on_edge(a, ac), on_edge(b, c - b)
     options = [(v, w), (t_ab, 0 * t_ab), (0 * t_ac, t_ac), (1 - t_bc, t_bc)]
     best = np.full(v.shape, np.inf)
-    share = np.zeros((*v.shape, 3))
+    fraction = np.zeros((*v.shape, 3))
     for k, (x, y) in enumerate(options):
         at = a + x[..., None] * ab + y[..., None] * ac
         away = np.linalg.norm(points[:, None] - at, axis=-1)
         away = np.where(inside, away, np.inf) if k == 0 else away
         nearer = away < best
         best = np.where(nearer, away, best)
-        share[nearer] = np.stack([1 - x - y, x, y], -1)[nearer]
+        fraction[nearer] = np.stack([1 - x - y, x, y], -1)[nearer]
     row, pick = np.arange(len(points)), best.argmin(1)
-    return candidates[row, pick], share[row, pick], best[row, pick]
+    return candidates[row, pick], fraction[row, pick], best[row, pick]
 
 
 def _stacked(vertices: Pieces, keypoints: Pieces, field: str) -> np.ndarray:
@@ -102,16 +102,16 @@ def make_body_model(grid: SurfaceGrid, body: Body | None = None, vertices: int =
     own = Pieces(whole.rest[kept], whole.basis[:, kept], whole.weights[kept], whole.normals[kept], whole.region[kept])
     weight_joints, weights = heaviest(_stacked(own, puppet.landmarks, "weights"))
     reached = ~np.isnan(grid.points).any(-1)
-    nearest, share, _ = nearest_on_triangles(grid.points[reached], body.template.vertices[kept][triangles])
+    nearest, fraction, _ = nearest_on_triangles(grid.points[reached], body.template.vertices[kept][triangles])
     surface_triangle = np.full(reached.shape, NOWHERE)
     surface_triangle[reached] = nearest
-    surface_share = np.zeros((*reached.shape, 2))
-    surface_share[reached] = share[:, :2]
+    surface_fraction = np.zeros((*reached.shape, 2))
+    surface_fraction[reached] = fraction[:, :2]
     assert puppet.joint_basis.shape[0] == SHAPES
     return BodyModel(
         JOINTS, NAMES, np.array(PARENT),
         puppet.joint_rest.numpy().astype(np.float64), puppet.joint_basis.numpy().astype(np.float64),
         _stacked(own, puppet.landmarks, "rest"), _stacked(own, puppet.landmarks, "basis"),
-        weight_joints, weights, triangles, surface_triangle, surface_share,
+        weight_joints, weights, triangles, surface_triangle, surface_fraction,
         pose_prior(drawn_rotations(body, POSES)),
     )  # fmt: skip

@@ -41,8 +41,8 @@ _LIMIT_MARGIN = 1.0  # in added standard deviations, beyond the quantile
 
 @dataclass(frozen=True)
 class PosePrior:
-    """Of the 18 joints that have a parent, in the order of `JOINTS`, three numbers each: mean [54], precision
-    [54, 54], low and high [54], radians."""
+    """Statistics of the 18 joints that have a parent, in the order of `JOINTS`, three numbers each: mean [54],
+    precision [54, 54], low and high [54], radians."""
 
     mean: np.ndarray
     precision: np.ndarray

@@ -5,7 +5,7 @@
 
 Distances are in millimetres after a similarity transform (Procrustes), so size, place and orientation do not count, and
 before it, from the pelvis, in axes of the camera. `true` fits to the exact labels, `network` to those of dense pose.
-`baseline` is the mean body in the mean pose of the prior. A person counts where the image shows at least --least-pixels
+`baseline` is the mean body in the mean pose of the prior. A person counts where the image shows at least --min-pixels
 of them; `whole` are those of whom it shows at least 12 of the 15 joints.
 """
 
@@ -27,7 +27,7 @@ from export.people.clips.clip_file import PeopleClip, clip_paths, read_clip
 _BODY_JOINT = {"shoulder": "upper_arm", "elbow": "lower_arm", "wrist": "hand", "hip": "upper_leg", "knee": "lower_leg",
                "ankle": "foot"}  # fmt: skip
 _WHOLE_JOINTS = 12
-_LEAST_OVERLAP = 0.5  # of the masks of a person who was found and a true one
+_MIN_OVERLAP = 0.5  # of the masks of a person who was found and a true one
 
 
 def body_joint(name: str) -> str:
@@ -90,7 +90,7 @@ def matches(found: np.ndarray, true: np.ndarray, people: int) -> dict[int, int]:
         mask = true == person + 1
         numbers, counts = np.unique(found[mask], return_counts=True)
         for number, count in sorted(zip(numbers, counts, strict=True), key=lambda pair: -pair[1]):
-            if number > 0 and count > _LEAST_OVERLAP * (mask | (found == number)).sum():
+            if number > 0 and count > _MIN_OVERLAP * (mask | (found == number)).sum():
                 out[person] = int(number) - 1
                 break
     return out
@@ -119,7 +119,7 @@ def answers(
         match = matches(person, clip.label(frame)[..., 3], truth.people)
         turn = truth.world_to_camera[frame][:, :3]
         for k in range(truth.people):
-            if truth.visible_px[frame, k] < options.least_pixels:
+            if truth.visible_px[frame, k] < options.min_pixels:
                 continue
             true = truth.joints_m[frame, k] @ turn.T
             whole = bool(truth.joint_visible[frame, k].sum() >= _WHOLE_JOINTS)
@@ -156,7 +156,7 @@ def main() -> None:
     parser.add_argument("--densepose", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--every", type=int, default=1, help="frames of which one counts (default %(default)s)")
     parser.add_argument("--frames", type=int, help="only the first N of each clip")
-    parser.add_argument("--least-pixels", type=int, default=600)
+    parser.add_argument("--min-pixels", type=int, default=600)
     parser.add_argument("--labels", choices=("true", "network", "both"), default="both")
     parser.add_argument("--preset", choices=("stream", "photo"), default="stream", help="of dense pose")
     parser.add_argument("--no-intrinsics", dest="intrinsics", action="store_false", help="weak perspective")

@@ -25,7 +25,7 @@ BODY_ANGLES = ("left_elbow", "right_elbow", "left_knee", "right_knee", "left_hip
 
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
-    """What all bodies share. triangles: uint32 [F, 3]. joint_names, joint_parents: -1 for the first joint."""
+    """The mesh and the skeleton of all bodies. triangles: uint32 [F, 3]. joint_parents: -1 for the first joint."""
 
     vertex_count: int
     triangles: np.ndarray

@@ -55,8 +55,8 @@ typedef enum maq_body_fit {
 } maq_body_fit;
 
 /* Angles of joints in degrees. Elbow and knee: 0 when straight. Hip and shoulder: direction of the limb in the sagittal
- * plane of pelvis or chest: 0 hanging down, 90 to the front, negative to the back; they mean little for a limb that
- * points sideways. */
+ * plane of pelvis or chest. It is 0 when the limb hangs down, 90 to the front, negative to the back. It means little
+ * for a limb that points sideways. */
 typedef enum maq_body_angle {
   MAQ_BODY_ANGLE_LEFT_ELBOW = 0,
   MAQ_BODY_ANGLE_RIGHT_ELBOW = 1,
@@ -130,7 +130,8 @@ MAQ_API maq_status maq_body_create(maq_context* context, const maq_body_config* 
 MAQ_API void maq_body_destroy(maq_body* body);
 
 /* Fits a body to each person of a dense pose image. A person with an id starts from the body in the frame before, if
- * that was at most a second earlier, and keeps one shape over all frames. A time that goes back starts a new stream.
+ * that was at most a second earlier. The shape of such a person settles over the frames. A time that goes back starts a
+ * new stream.
  * `*result` comes from a pool of result_pool_size: release it with maq_body_result_release.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_POOL_EMPTY. Blocks while it computes. */
 MAQ_API maq_status maq_body_run(maq_body* body, const maq_body_input* input, maq_body_result** result);

@@ -40,7 +40,7 @@ TEST(BodyFiles, AreWhatPythonWrote) {
   EXPECT_EQ(body.triangles, (std::vector<uint32_t>{0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2}));
   EXPECT_EQ(body.surface_nodes, 2);
   EXPECT_EQ(body.surface[3].triangle, 3);
-  EXPECT_NEAR(body.surface[3].shares[2], 0.4, 1e-6);
+  EXPECT_NEAR(body.surface[3].fractions[2], 0.4, 1e-6);
   EXPECT_EQ(body.surface[95].triangle, kNoTriangle);
   EXPECT_NEAR(body.prior.mean[2], 0.2, 1e-7);
   EXPECT_NEAR(body.prior.high[3], 1.4, 1e-6);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "head/camera/se3.h"
+#include "head/camera/head_camera.h"
 
 namespace {
 

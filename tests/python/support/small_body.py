@@ -18,8 +18,8 @@ def small_body() -> BodyModel:
     weights = np.tile([0.5, 0.25, 0.25, 0], (len(points), 1))
     triangle = np.full((24, 2, 2), NOWHERE)
     triangle[:12] = np.arange(48).reshape(12, 2, 2) % 4
-    share = np.zeros((24, 2, 2, 2))
-    share[:12, ..., 0], share[:12, ..., 1] = 0.4, 0.2
+    fraction = np.zeros((24, 2, 2, 2))
+    fraction[:12, ..., 0], fraction[:12, ..., 1] = 0.4, 0.2
     precision = 4 * np.eye(6)
     precision[0, 3] = precision[3, 0] = -1
     mean = np.array([0, 0.1, 0.2, -0.1, 0, 0])
@@ -27,5 +27,5 @@ def small_body() -> BodyModel:
         ("pelvis", "chest", "head"), NAMES, np.array([-1, 0, 1]),
         np.array([[0, 0, 0], [0, 0, 0.25], [0, 0, 0.5]]), np.full((1, 3, 3), 0.01) * np.arange(3)[:, None],
         points, points[None] / 8, weight_joints, weights, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]),
-        triangle, share, PosePrior(mean, precision, mean - 1, mean + 1.5),
+        triangle, fraction, PosePrior(mean, precision, mean - 1, mean + 1.5),
     )  # fmt: skip

@@ -5,7 +5,7 @@
 #include "api/boundary.h"
 #include "api/bundle_argument.h"
 #include "api/model_options.h"
-#include "body/model/body_bundle.h"
+#include "body/model/body_file.h"
 
 using namespace maq;
 

@@ -98,12 +98,12 @@ class BvhText {
   void write_frame(size_t before, double at_ns) {
     const ClipPose &a = person_.poses[before], &b = person_.poses[std::min(before + 1, person_.poses.size() - 1)];
     const double span = double(b.timestamp_ns - a.timestamp_ns);
-    const double share = span > 0 ? std::clamp((at_ns - double(a.timestamp_ns)) / span, 0.0, 1.0) : 0;
-    write_vector(kCentimetres * (kCameraToFile * (a.pose.place + share * (b.pose.place - a.pose.place))));
+    const double fraction = span > 0 ? std::clamp((at_ns - double(a.timestamp_ns)) / span, 0.0, 1.0) : 0;
+    write_vector(kCentimetres * (kCameraToFile * (a.pose.place + fraction * (b.pose.place - a.pose.place))));
     for (const size_t joint : order_) {
       const Mat3 from = rotation(joint, a.pose), to = rotation(joint, b.pose);
       text_ << ' ';
-      write_vector(angles_of(from * exp_rotation(share * log_rotation(transposed(from) * to))));
+      write_vector(angles_of(from * exp_rotation(fraction * log_rotation(transposed(from) * to))));
     }
     text_ << '\n';
   }

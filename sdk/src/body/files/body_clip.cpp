@@ -37,8 +37,8 @@ void BodyClip::add(int64_t id, const ClipPose& pose) {
     if (pose.timestamp_ns > found->poses.back().timestamp_ns) found->poses.push_back(pose);
     return;
   }
-  if (people_.size() == kMostPeople) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "A clip of bodies has at most ", kMostPeople,
+  if (people_.size() == kMaxPeople) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "A clip of bodies has at most ", kMaxPeople,
                 " people; save it and begin another.");
   }
   people_.push_back({id, {pose}});

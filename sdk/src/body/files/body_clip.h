@@ -29,10 +29,10 @@ Vec3 place_in_metres(const BodyCamera& camera, Vec3 place, int width_px, int hei
 
 class BodyClip {
  public:
-  static constexpr size_t kMostPeople = 1000;
+  static constexpr size_t kMaxPeople = 1000;
 
   // Adds a pose of the person with that id, or of a new person for id 0. Poses of a person with a time that is not
-  // later than the one before are left out. Throws MAQ_ERROR_UNSUPPORTED for more than kMostPeople.
+  // later than the one before are left out. Throws MAQ_ERROR_UNSUPPORTED for more than kMaxPeople.
   void add(int64_t id, const ClipPose& pose);
 
   // The person with the most poses is first.

@@ -26,8 +26,8 @@ using Quaternion = std::array<double, 4>;  // x, y, z, w
 
 inline Quaternion quaternion_of(const Mat3& rotation) {
   const Vec3 w = log_rotation(rotation);
-  const double angle = length(w), share = sine_ratio(angle / 2) / 2;
-  return {share * w.x, share * w.y, share * w.z, std::cos(angle / 2)};
+  const double angle = length(w), fraction = sine_ratio(angle / 2) / 2;
+  return {fraction * w.x, fraction * w.y, fraction * w.z, std::cos(angle / 2)};
 }
 
 // The one of the two quaternions of the same rotation that is nearer to the one before.

@@ -9,9 +9,9 @@
 namespace maq::body {
 namespace {
 
-constexpr size_t kLeastPoints = 24;
-constexpr double kLeastInliers = 0.4, kLeastWarmInliers = 0.6;
-constexpr double kFirstDamping = 1e-3, kMostDamping = 1e8, kLeastDamping = 1e-7;
+constexpr size_t kMinPoints = 24;
+constexpr double kMinInliers = 0.4, kMinWarmInliers = 0.6;
+constexpr double kFirstDamping = 1e-3, kMaxDamping = 1e8, kMinDamping = 1e-7;
 constexpr double kSmallDecrease = 2e-4;  // of the cost: the fit has converged
 constexpr double kWideErrors = 3;        // robust_errors of the first iterations, by those of the rest
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -30,7 +30,7 @@ double BodyFitter::improve(const FitProblem& problem, int iterations, BodyPose& 
     ++taken;
     double next_cost = kInfinite;
     BodyPose next;
-    while (damping <= kMostDamping) {
+    while (damping <= kMaxDamping) {
       for (size_t row = 0; row < count; ++row) {
         const double* const from = equations_.matrix().data() + row * kMaxUnknowns;
         std::copy_n(from, row + 1, damped_.data() + row * kMaxUnknowns);
@@ -38,7 +38,7 @@ double BodyFitter::improve(const FitProblem& problem, int iterations, BodyPose& 
         step[row] = -equations_.gradient()[row];
       }
       if (solve_positive(damped_.data(), int(count), int(kMaxUnknowns), step.data(), 1)) {
-        next = stepped(model_, pose, step.data(), settings_.most_shape);
+        next = stepped(model_, pose, step.data(), settings_.max_shape);
         next_cost = equations_.cost(problem, next);
         if (next_cost < cost) break;
       }
@@ -48,7 +48,7 @@ double BodyFitter::improve(const FitProblem& problem, int iterations, BodyPose& 
     const bool is_small = cost - next_cost < kSmallDecrease * cost;
     pose = next;
     cost = next_cost;
-    damping = std::max(damping / 4, kLeastDamping);
+    damping = std::max(damping / 4, kMinDamping);
     if (is_small || i + 1 == iterations) break;
     cost = equations_.linearize(problem, pose);
   }
@@ -94,7 +94,7 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
                            const ShapePrior& shape) {
   FittedBody body;
   body.pose = mean_pose(model_);
-  if (seen.surface_count < kLeastPoints || !(seen.size_px > 0)) return body;
+  if (seen.surface_count < kMinPoints || !(seen.size_px > 0)) return body;
   FitProblem problem;
   problem.seen = &seen;
   problem.camera = camera;
@@ -108,14 +108,14 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
     problem.before_precision = settings_.frame_precision;
     body.pose = *before;
     cost = improve(problem, settings_.warm_iterations, body.pose, body.iterations);
-    if (std::isfinite(cost) && equations_.inlier_fraction() < kLeastWarmInliers) cost = kInfinite;
+    if (std::isfinite(cost) && equations_.inlier_fraction() < kMinWarmInliers) cost = kInfinite;
     problem.before = nullptr;  // what follows is not near it
     problem.before_precision = 0;
   }
   if (!std::isfinite(cost)) cost = from_starts(problem, body.pose, body.iterations);
   if (std::isfinite(cost)) describe(problem, body);
   body.status =
-      std::isfinite(cost) && body.inlier_fraction >= kLeastInliers ? FitStatus::kFitted : FitStatus::kUnreliable;
+      std::isfinite(cost) && body.inlier_fraction >= kMinInliers ? FitStatus::kFitted : FitStatus::kUnreliable;
   if (body.status != FitStatus::kFitted) body.pose = mean_pose(model_);
   return body;
 }

@@ -28,9 +28,9 @@ struct FittedBody {
 struct FitSettings {
   double error_of_size = 0.05;  // error of a pixel, by Observations::size_px
   double robust_errors = 3;
-  double independent_points = 60;  // many points share their errors: they weigh together as much as so many
+  double independent_points = 60;  // many points fraction their errors: they weigh together as much as so many
   double frame_precision = 40;     // of an angle's change from frame to frame, by radian squared
-  double most_shape = 3;           // standard deviations
+  double max_shape = 3;            // standard deviations
   int first_iterations = 6;        // of each start
   int iterations = 24;             // of the best start
   int warm_iterations = 8;

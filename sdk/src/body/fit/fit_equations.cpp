@@ -55,7 +55,7 @@ Projection FitEquations::rows_of(const FitProblem& problem, const BodyPose& pose
                                  PointRows& rows) const {
   rows.count = 0;
   const Vec3 rest = shaped(point.rest, point.basis, pose.shape, model_.shape_count);
-  // Of each joint that moves the point: the part of the point that it turns, and its weight.
+  // The part of the point that each of its joints turns, and the weight of this part.
   std::array<Vec3, kMaxJoints> carried;
   std::array<double, kMaxJoints> carried_weight;
   uint32_t movers = 0;
@@ -202,7 +202,7 @@ double FitEquations::linearize(const FitProblem& problem, const BodyPose& pose) 
   return std::isfinite(sum) ? sum : kInfinite;
 }
 
-BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* step, double most_shape) {
+BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* step, double max_shape) {
   BodyPose next = pose;
   const auto vector_at = [&](size_t at) { return Vec3{step[at], step[at + 1], step[at + 2]}; };
   next.orientation = exp_rotation(vector_at(0)) * pose.orientation;
@@ -211,7 +211,7 @@ BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* ste
     next.rotation[j] = pose.rotation[j] + vector_at(kJointUnknown + 3 * (j - 1));
   }
   for (size_t s = 0; s < model.shape_count; ++s) {
-    next.shape[s] = std::clamp(pose.shape[s] + step[shape_unknown(model) + s], -most_shape, most_shape);
+    next.shape[s] = std::clamp(pose.shape[s] + step[shape_unknown(model) + s], -max_shape, max_shape);
   }
   return next;
 }

@@ -60,7 +60,7 @@ class FitEquations {
   // The pixel of a point in the pose of the latest linearize(), and its rows.
   Projection rows_of(const FitProblem& problem, const BodyPose& pose, const SeenPoint& point, PointRows& rows) const;
 
-  // Of the latest cost() or linearize(): the share of surface points with an error below robust_errors.
+  // Returns, for the latest cost() or linearize(), the fraction of surface points with an error below robust_errors.
   double inlier_fraction() const { return inlier_fraction_; }
 
  private:
@@ -80,7 +80,7 @@ class FitEquations {
   double inlier_fraction_ = 0;
 };
 
-// The pose after a step of the unknowns, with its shape within `most_shape` standard deviations.
-BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* step, double most_shape);
+// The pose after a step of the unknowns, with its shape within `max_shape` standard deviations.
+BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* step, double max_shape);
 
 }  // namespace maq::body

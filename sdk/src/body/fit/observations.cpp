@@ -13,10 +13,10 @@ class PointSum {
  public:
   explicit PointSum(SeenPoint& sum) : sum_(sum) { sum_ = {}; }
 
-  void add(const BodyPoint& point, double share, size_t shapes) {
-    sum_.rest = sum_.rest + share * point.rest;
-    for (size_t s = 0; s < shapes; ++s) sum_.basis[s] = sum_.basis[s] + share * point.basis[s];
-    for (size_t k = 0; k < kWeights; ++k) weights_[point.joints[k]] += share * point.weights[k];
+  void add(const BodyPoint& point, double fraction, size_t shapes) {
+    sum_.rest = sum_.rest + fraction * point.rest;
+    for (size_t s = 0; s < shapes; ++s) sum_.basis[s] = sum_.basis[s] + fraction * point.basis[s];
+    for (size_t k = 0; k < kWeights; ++k) weights_[point.joints[k]] += fraction * point.weights[k];
   }
 
   void finish() {
@@ -60,25 +60,26 @@ bool surface_point(const BodyModel& model, int part, double u, double v, SeenPoi
   if (part < 1 || part > int(kParts) || !(u >= 0 && u <= 1 && v >= 0 && v <= 1)) return false;
   const double at_u = u * (nodes - 1), at_v = v * (nodes - 1);
   const int low_u = std::min(int(at_u), nodes - 2), low_v = std::min(int(at_v), nodes - 2);
-  const double share_u = at_u - low_u, share_v = at_v - low_v;
+  const double fraction_u = at_u - low_u, fraction_v = at_v - low_v;
   std::array<const SurfaceNode*, 4> node{};
-  std::array<double, 4> share{};
+  std::array<double, 4> fraction{};
   double total = 0;
   for (int k = 0; k < 4; ++k) {
     const int i = k / 2, j = k % 2;
     node[size_t(k)] = &model.surface[size_t(((part - 1) * nodes + low_u + i) * nodes + low_v + j)];
     if (node[size_t(k)]->triangle == kNoTriangle) continue;
     // A node counts a little even from afar, so that the rim of the chart has a point.
-    share[size_t(k)] = std::max((i == 0 ? 1 - share_u : share_u) * (j == 0 ? 1 - share_v : share_v), 1e-6);
-    total += share[size_t(k)];
+    fraction[size_t(k)] =
+        std::max((i == 0 ? 1 - fraction_u : fraction_u) * (j == 0 ? 1 - fraction_v : fraction_v), 1e-6);
+    total += fraction[size_t(k)];
   }
   if (total <= 0) return false;
   PointSum sum(point);
   for (size_t k = 0; k < 4; ++k) {
-    if (share[k] <= 0) continue;
+    if (fraction[k] <= 0) continue;
     for (size_t corner = 0; corner < 3; ++corner) {
       const uint32_t vertex = model.triangles[3 * size_t(node[k]->triangle) + corner];
-      sum.add(model.vertices[vertex], share[k] / total * node[k]->shares[corner], model.shape_count);
+      sum.add(model.vertices[vertex], fraction[k] / total * node[k]->fractions[corner], model.shape_count);
     }
   }
   sum.finish();
@@ -108,11 +109,11 @@ void sample_person(const BodyModel& model, const LabelImage& image, uint8_t numb
   found.surface_count = found.points.size();
 }
 
-void add_keypoints(const BodyModel& model, const float* keypoints, double least, Observations& found) {
+void add_keypoints(const BodyModel& model, const float* keypoints, double min_confidence, Observations& found) {
   for (size_t k = 0; k < kKeypoints; ++k) {
     const double x = double(keypoints[3 * k]), y = double(keypoints[3 * k + 1]),
                  confidence = double(keypoints[3 * k + 2]);
-    if (!std::isfinite(x) || !std::isfinite(y) || !(confidence >= least)) continue;
+    if (!std::isfinite(x) || !std::isfinite(y) || !(confidence >= min_confidence)) continue;
     Observation observation;
     PointSum sum(observation.point);
     sum.add(model.keypoints[k], 1, model.shape_count);

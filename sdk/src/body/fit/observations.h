@@ -1,4 +1,4 @@
-// What an image shows of one person: pixels, and the points of the body that are seen there.
+// Observations of one person in an image: pixels, and the points of the body that are seen there.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ struct PersonPixels {
   int left = 0, top = 0, right = 0, bottom = 0;
 };
 
-// Of each number of a person.
+// The pixels of each person, by the number in the person plane.
 using PeoplePixels = std::array<PersonPixels, 256>;
 PeoplePixels find_people(const LabelImage& image);
 
@@ -63,7 +63,7 @@ void sample_person(const BodyModel& model, const LabelImage& image, uint8_t numb
                    int target, Observations& found);
 
 // Adds keypoints [33][3]: x, y (pixel k covers k to k + 1) and confidence. Values that are not finite, and confidences
-// below `least`, are left out.
-void add_keypoints(const BodyModel& model, const float* keypoints, double least, Observations& found);
+// below `min_confidence`, are left out.
+void add_keypoints(const BodyModel& model, const float* keypoints, double min_confidence, Observations& found);
 
 }  // namespace maq::body

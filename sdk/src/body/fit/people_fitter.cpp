@@ -7,9 +7,9 @@ namespace {
 
 constexpr int64_t kForgetAfter_ns = 1'000'000'000;
 constexpr int kSampledPixels = 220;
-constexpr int64_t kLeastPixels = 100;
-constexpr double kLeastConfidence = 0.15;
-constexpr double kMostFrames = 30;       // of the running mean of a shape
+constexpr int64_t kMinPixels = 100;
+constexpr double kMinConfidence = 0.15;
+constexpr double kMaxFrames = 30;        // of the running mean of a shape
 constexpr double kPrecisionOfFrame = 1;  // that each frame adds to the prior of the shape
 
 }  // namespace
@@ -17,7 +17,7 @@ constexpr double kPrecisionOfFrame = 1;  // that each frame adds to the prior of
 PeopleFitter::PeopleFitter(const BodyModel& model, const FitSettings& settings)
     : model_(model), fitter_(model, settings) {
   seen_.points.reserve(4 * kSampledPixels);
-  tracks_.reserve(kMostTracks);
+  tracks_.reserve(kMaxTracks);
 }
 
 void PeopleFitter::begin_frame(const LabelImage& image, const BodyCamera& camera, int64_t timestamp_ns) {
@@ -40,7 +40,7 @@ PeopleFitter::Track* PeopleFitter::find_track(int64_t id) {
 void PeopleFitter::keep(int64_t id, const BodyPose& pose) {
   Track* track = find_track(id);
   if (track == nullptr) {
-    if (tracks_.size() == kMostTracks) {
+    if (tracks_.size() == kMaxTracks) {
       const auto is_older = [](const Track& a, const Track& b) { return a.seen_ns < b.seen_ns; };
       tracks_.erase(std::min_element(tracks_.begin(), tracks_.end(), is_older));
     }
@@ -51,7 +51,7 @@ void PeopleFitter::keep(int64_t id, const BodyPose& pose) {
   track->pose = pose;
   track->is_perspective = camera_.is_perspective;
   track->seen_ns = now_ns_;
-  track->frames = std::min(track->frames + 1, kMostFrames);
+  track->frames = std::min(track->frames + 1, kMaxFrames);
   for (size_t s = 0; s < kMaxShapes; ++s) track->shape[s] += (pose.shape[s] - track->shape[s]) / track->frames;
 }
 
@@ -59,9 +59,9 @@ FittedBody PeopleFitter::fit(const PersonRequest& person) {
   const PersonPixels& pixels = people_[person.number];
   FittedBody body;
   body.pose = mean_pose(model_);
-  if (pixels.count < kLeastPixels) return body;
+  if (pixels.count < kMinPixels) return body;
   sample_person(model_, image_, person.number, pixels, kSampledPixels, seen_);
-  if (person.keypoints != nullptr) add_keypoints(model_, person.keypoints, kLeastConfidence, seen_);
+  if (person.keypoints != nullptr) add_keypoints(model_, person.keypoints, kMinConfidence, seen_);
   const Track* const track = person.id == 0 ? nullptr : find_track(person.id);
   const bool is_warm = track != nullptr && track->is_perspective == camera_.is_perspective;
   ShapePrior shape;

@@ -17,7 +17,7 @@ struct PersonRequest {
 
 class PeopleFitter {
  public:
-  static constexpr size_t kMostTracks = 64;
+  static constexpr size_t kMaxTracks = 64;
 
   // `model` must outlive this.
   explicit PeopleFitter(const BodyModel& model, const FitSettings& settings = {});

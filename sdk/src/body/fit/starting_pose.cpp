@@ -50,7 +50,7 @@ StartingPoses::StartingPoses(const BodyModel& model) : model_(model), mean_(mean
   pose.orientation = kIdentity3;
   bones_ = bones_of(model, pose);
   for (const Mat3& orientation : orientations()) candidates_.push_back({orientation});
-  found_.reserve(kMost);
+  found_.reserve(kMaxStarts);
 }
 
 const std::vector<BodyPose>& StartingPoses::find(const Observations& seen, const BodyCamera& camera) {
@@ -102,7 +102,7 @@ const std::vector<BodyPose>& StartingPoses::find(const Observations& seen, const
                           ? (spread_px - together * candidate.scale) * (1 + kTiltPenalty * (1 - upright))
                           : std::numeric_limits<double>::infinity();
   }
-  while (found_.size() < kMost) {
+  while (found_.size() < kMaxStarts) {
     const Candidate* best = nullptr;
     for (const Candidate& candidate : candidates_) {
       const auto is_near = [&](const BodyPose& pose) {

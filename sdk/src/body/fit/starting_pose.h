@@ -12,11 +12,11 @@ namespace maq::body {
 
 class StartingPoses {
  public:
-  static constexpr size_t kMost = 3;
+  static constexpr size_t kMaxStarts = 3;
 
   explicit StartingPoses(const BodyModel& model);
 
-  // Poses of which the best starts are first, at least 45 degrees from each other; at most kMost. Empty where the
+  // Poses of which the best starts are first, at least 45 degrees from each other; at most kMaxStarts. Empty where the
   // pixels tell no scale: too few, or all in one place.
   const std::vector<BodyPose>& find(const Observations& seen, const BodyCamera& camera);
 

@@ -77,11 +77,11 @@ void read_points(CheckedBytes& file, const BodyFileHead& head, const std::vector
 void read_surface(CheckedBytes& file, const BodyFileHead& head, BodyModel& model) {
   const size_t count = kParts * size_t(head.surface_nodes) * head.surface_nodes;
   const auto triangles = stored<uint16_t>(file, count);
-  const auto shares = stored<uint8_t>(file, 2 * count);
+  const auto fractions = stored<uint8_t>(file, 2 * count);
   model.surface_nodes = int(head.surface_nodes);
   model.surface.resize(count);
   for (size_t i = 0; i < count; ++i) {
-    const double a = double(shares[2 * i]) / kWhole, b = double(shares[2 * i + 1]) / kWhole;
+    const double a = double(fractions[2 * i]) / kWhole, b = double(fractions[2 * i + 1]) / kWhole;
     model.surface[i] = {triangles[i], {a, b, 1 - a - b}};
   }
 }
@@ -114,6 +114,13 @@ BodyModel read_body(const void* bytes, size_t count, const std::string& name) {
     file.fail(" cannot be used: ", fault, ". Export the bundle again.");
   }
   return model;
+}
+
+std::shared_ptr<const BodyModel> model_of_bundle(const Bundle& bundle) {
+  bundle.manifest.require_task("body");
+  const std::string name = bundle.manifest.listed_file(bundle.manifest.root.at("body").at("file"));
+  const std::vector<uint8_t>& bytes = bundle.files.at(name);
+  return std::make_shared<const BodyModel>(read_body(bytes.data(), bytes.size(), bundle.path_of(name)));
 }
 
 }  // namespace maq::body

@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "body/model/body_model.h"
 #include "core/files/checked_bytes.h"
+#include "nn/bundle.h"
 
 namespace maq::body {
 
@@ -19,7 +21,7 @@ inline constexpr uint64_t kMaxBodyFileBytes = uint64_t(4) << 20;
 // points (vertices, then keypoints): i16 rest [points][3], i16 basis [shapes][points][3], u8 joints [points][4],
 // u8 weights [points][4] (sum 255).
 // triangles: u16 [triangles][3].
-// surface: u16 triangle [24][nodes][nodes] (65535: none), u8 shares of its first two vertices [24][nodes][nodes][2].
+// surface: u16 triangle [24][nodes][nodes] (65535: none), u8 fractions of its first two vertices [24][nodes][nodes][2].
 // prior, of A = 3 (joints - 1) angles: float32 mean [A], low [A], high [A], precision [A][A].
 struct BodyFileHead {
   FileStart start;
@@ -34,5 +36,9 @@ static_assert(sizeof(BodyFileHead) == 64);
 // Throws MAQ_ERROR_BAD_BUNDLE for a file that is not a body, truncated or damaged; MAQ_ERROR_UNSUPPORTED for another
 // version, or more than kMaxBodyFileBytes.
 BodyModel read_body(const void* bytes, size_t count, const std::string& name);
+
+// Returns the body of a bundle. Throws MAQ_ERROR_UNSUPPORTED for a bundle of another task, MAQ_ERROR_BAD_BUNDLE if the
+// manifest names no body, and the errors of read_body().
+std::shared_ptr<const BodyModel> model_of_bundle(const Bundle& bundle);
 
 }  // namespace maq::body

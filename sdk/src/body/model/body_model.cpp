@@ -102,7 +102,7 @@ std::string model_fault(const BodyModel& model) {
   }
   for (const SurfaceNode& node : model.surface) {
     if (node.triangle == kNoTriangle) continue;
-    if (3 * size_t(node.triangle) >= model.triangles.size() || !(node.shares[2] > -1e-9)) {
+    if (3 * size_t(node.triangle) >= model.triangles.size() || !(node.fractions[2] > -1e-9)) {
       return "its surface lies on triangles that it does not have, or beside one";
     }
   }

@@ -34,8 +34,8 @@ struct BodyJoint {
 
 // A node of the surface labels: a point of a triangle.
 struct SurfaceNode {
-  uint16_t triangle = kNoTriangle;  // kNoTriangle: no chart reaches the node
-  std::array<double, 3> shares{};   // of the triangle's vertices, sum 1
+  uint16_t triangle = kNoTriangle;    // kNoTriangle: no chart reaches the node
+  std::array<double, 3> fractions{};  // of the triangle's vertices, sum 1
 };
 
 // Mean, limits and precision (row by row) of the rotation vectors of all joints but the first, 3 numbers each, radians.

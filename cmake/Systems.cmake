@@ -1,11 +1,12 @@
 # The systems of the library, each of which can be left out: MAQ_WITH_DENSEPOSE and others. Cameras, files and the
 # pipeline are always in; every combination is possible.
-set(MAQ_SYSTEMS DENSEPOSE SCENES EDGES HEADS PREDICTION)
+set(MAQ_SYSTEMS DENSEPOSE SCENES EDGES HEADS PREDICTION BODY)
 option(MAQ_WITH_DENSEPOSE "Dense pose of people" ON)
 option(MAQ_WITH_SCENES "Captures and scenes" ON)
 option(MAQ_WITH_EDGES "Edges and curves in depth" ON)
 option(MAQ_WITH_HEADS "Heads from photos" ON)
 option(MAQ_WITH_PREDICTION "Prediction of frames, novelty, concealment of gaps" ON)
+option(MAQ_WITH_BODY "Bodies of people: pose, shape and mesh" ON)
 
 # For each system: its folders in sdk/src, its models, and patterns of its files in sdk/src/api, of its public headers and
 # of its exported functions.
@@ -39,6 +40,12 @@ set(MAQ_PREDICTION_MODELS prediction-int8)
 set(MAQ_PREDICTION_API "prediction/.*")
 set(MAQ_PREDICTION_HEADERS "(${_names}).*")
 set(MAQ_PREDICTION_EXPORTS "maq_(${_names})_.*|maq_pipeline_result_get_(novelty|predicted_frame)")
+
+set(MAQ_BODY_FOLDERS body)
+set(MAQ_BODY_MODELS body)
+set(MAQ_BODY_API "body/.*")
+set(MAQ_BODY_HEADERS "body.*")
+set(MAQ_BODY_EXPORTS "maq_body_.*")
 
 # MAQ_SYSTEMS_IN, MAQ_SYSTEMS_OUT: the names. MAQ_WITHOUT_API, _HEADERS, _EXPORTS: patterns of the systems that are out.
 set(MAQ_SYSTEMS_IN)

@@ -21,6 +21,7 @@ SETTINGS = {
     "RecorderSettings": ("maq_recorder_config", ()),
     "ModelSettings": ("maq_model_options", ("bundle_files", "bundle_file_count")),
     "DensePoseSettings": ("maq_densepose_config", ()),
+    "BodySettings": ("maq_body_config", ()),
     "EdgesSettings": ("maq_edges_config", ()),
     "CurvesSettings": ("maq_edges_curves_config", ()),
     "EdgesFusionSettings": ("maq_edges_fusion_config", ()),

@@ -8,7 +8,7 @@
 # --sizes FILE: writes the sizes as JSON, for the benchmark report.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-systems="DENSEPOSE SCENES EDGES HEADS PREDICTION"
+systems="DENSEPOSE SCENES EDGES HEADS PREDICTION BODY"
 tests=ON
 sizes=
 names=()

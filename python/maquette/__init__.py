@@ -1,4 +1,4 @@
-"""Maquette: a camera into 3D on two CPU cores. Dense pose, scenes, edges, heads and prediction over numpy arrays.
+"""Maquette: a camera into 3D on two CPU cores. Dense pose, bodies, scenes, edges, heads and prediction over numpy.
 
     import maquette
     result = maquette.DensePose().run(rgb)          # uint8 [H, W, 3]
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from maquette.bodies import BODY_ANGLES, Body, BodyClip, BodyMesh, BodyPerson, BodyResult
 from maquette.densepose import (
     COCO_KEYPOINTS,
     KEYPOINTS,
@@ -59,14 +60,15 @@ from maquette.sources import (
 )
 
 __all__ = [
-    "COCO_KEYPOINTS", "KEYPOINTS",
-    "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose",
-    "DensePoseModel", "DensePoseResult", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
-    "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
-    "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline",
-    "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder",
-    "Scene", "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path",
-    "list_cameras", "list_source_schemes", "part_colours", "part_name", "sample",
+    "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS",
+    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "Box", "Camera", "CameraMode", "Capture",
+    "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose", "DensePoseModel", "DensePoseResult",
+    "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark",
+    "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget",
+    "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult",
+    "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder", "Scene", "SceneBuilder",
+    "SceneRenderer", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
+    "list_source_schemes", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

@@ -119,6 +119,13 @@ class DensePoseSettings(ModelSettings, total=False):
     Larger values flicker less."""
 
 
+class BodySettings(ModelSettings, total=False):
+    """Fields of maq_body_config."""
+
+    result_pool_size: int
+    """Results the app may hold at once, 1 to 64; 0 (default): 4."""
+
+
 class EdgesSettings(ModelSettings, total=False):
     """Fields of maq_edges_config."""
 

@@ -34,6 +34,9 @@ int main(int argc, char** argv) try {
 #if MAQ_HAS_DENSEPOSE
   add_densepose_command(app, &exit_code);
 #endif
+#if MAQ_HAS_DENSEPOSE && MAQ_HAS_BODY
+  add_body_command(app, &exit_code);
+#endif
 #if MAQ_HAS_EDGES
   add_edges_command(app, &exit_code);
 #endif

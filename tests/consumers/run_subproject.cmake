@@ -36,7 +36,8 @@ endfunction()
 
 must_run("${CMAKE_COMMAND}" -S "${app}" -B build "-DMAQUETTE=${SOURCE_DIR}" -DONNXRUNTIME=target
   "-DONNXRUNTIME_LIBRARY=${LIBRARY}" "-DONNXRUNTIME_HEADERS=${HEADERS}" -DMAQ_UNITY_FILES=16
-  -DMAQ_WITH_SCENES=OFF -DMAQ_WITH_EDGES=OFF -DMAQ_WITH_HEADS=OFF -DMAQ_WITH_PREDICTION=OFF)  # the app finds people
+  -DMAQ_WITH_SCENES=OFF -DMAQ_WITH_EDGES=OFF -DMAQ_WITH_HEADS=OFF -DMAQ_WITH_PREDICTION=OFF
+  -DMAQ_WITH_BODY=OFF)  # the app finds people
 file(STRINGS "${WORK_DIR}/build/CMakeCache.txt" build_type REGEX "^CMAKE_BUILD_TYPE:")
 if(NOT build_type MATCHES "^CMAKE_BUILD_TYPE:[A-Z]*=$")
   message(FATAL_ERROR "The app's build type was set: ${build_type}")

@@ -10,5 +10,6 @@
 #define MAQ_HAS_EDGES 1
 #define MAQ_HAS_HEADS 1
 #define MAQ_HAS_PREDICTION 1
+#define MAQ_HAS_BODY 1
 
 #endif /* MAQUETTE_FEATURES_H_ */

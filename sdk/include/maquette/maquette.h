@@ -127,5 +127,8 @@
 #include "maquette/prediction.h"
 #include "maquette/prediction_model.h"
 #endif
+#if MAQ_HAS_BODY
+#include "maquette/body.h"
+#endif
 
 #endif /* MAQUETTE_MAQUETTE_H_ */

@@ -37,5 +37,8 @@
 #include "maquette/prediction.hpp"
 #include "maquette/prediction_model.hpp"
 #endif
+#if MAQ_HAS_BODY
+#include "maquette/body.hpp"
+#endif
 
 #endif  // MAQUETTE_MAQUETTE_HPP_

@@ -12,13 +12,37 @@ namespace maq {
 namespace {
 
 // In the order of HandleKind.
-constexpr const char* kKinds[] = {
-    "no handle",          "a maq_context",       "a maq_frame",          "a maq_source",           "a maq_camera_list",
-    "a maq_recorder",     "a maq_clip",          "a maq_densepose",      "a maq_densepose_result", "a maq_pipeline",
-    "a maq_capture",      "a maq_scene",         "a maq_scene_builder",  "a maq_scene_renderer",   "a maq_image",
-    "a maq_edges",        "a maq_edges_result",  "a maq_edges_curves",   "a maq_edges_fusion",     "a maq_head",
-    "a maq_head_builder", "a maq_head_renderer", "a maq_head_mesh",      "a maq_predictor",        "a maq_concealer",
-    "a maq_novelty",      "a maq_model",         "a maq_pipeline_result"};
+constexpr const char* kKinds[] = {"no handle",
+                                  "a maq_context",
+                                  "a maq_frame",
+                                  "a maq_source",
+                                  "a maq_camera_list",
+                                  "a maq_recorder",
+                                  "a maq_clip",
+                                  "a maq_densepose",
+                                  "a maq_densepose_result",
+                                  "a maq_pipeline",
+                                  "a maq_capture",
+                                  "a maq_scene",
+                                  "a maq_scene_builder",
+                                  "a maq_scene_renderer",
+                                  "a maq_image",
+                                  "a maq_edges",
+                                  "a maq_edges_result",
+                                  "a maq_edges_curves",
+                                  "a maq_edges_fusion",
+                                  "a maq_head",
+                                  "a maq_head_builder",
+                                  "a maq_head_renderer",
+                                  "a maq_head_mesh",
+                                  "a maq_predictor",
+                                  "a maq_concealer",
+                                  "a maq_novelty",
+                                  "a maq_model",
+                                  "a maq_body",
+                                  "a maq_body_result",
+                                  "a maq_body_clip",
+                                  "a maq_pipeline_result"};
 static_assert(std::size(kKinds) == size_t(HandleKind::kPipelineResult) + 1);
 
 // The latest handles that are gone. Without a destructor: an app may destroy handles while the process ends.

@@ -36,6 +36,9 @@ enum class HandleKind : uint32_t {
   kConcealer,
   kNovelty,
   kModel,
+  kBody,
+  kBodyResult,
+  kBodyClip,
   kPipelineResult
 };
 

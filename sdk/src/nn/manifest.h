@@ -35,7 +35,7 @@ struct FileSpec {
 struct Manifest {
   std::string name;
   std::string version;
-  std::string task;       // "densepose", "scenes", "edges", "heads"
+  std::string task;       // "densepose", "scenes", "edges", "heads", "prediction", "body"
   std::string precision;  // "fp32", "int8"
   std::map<std::string, FileSpec> files;
   std::map<std::string, GraphSpec> graphs;

@@ -30,6 +30,7 @@ std::vector<SystemNetworks> networks_of_build() {
   add(MAQ_HAS_EDGES, kEdgesNetworks);
   add(MAQ_HAS_HEADS, kHeadsNetworks);
   add(MAQ_HAS_PREDICTION, kPredictionNetworks);
+  add(MAQ_HAS_BODY, kBodyNetworks);
   return systems;
 }
 

@@ -16,6 +16,7 @@ inline constexpr SystemNetworks kScenesNetworks{"scenes", "scenes-int8", "MAQ_SC
 inline constexpr SystemNetworks kEdgesNetworks{"edges", "edges-int8", "MAQ_EDGES_BUNDLE"};
 inline constexpr SystemNetworks kHeadsNetworks{"heads", "heads-int8", "MAQ_HEADS_BUNDLE"};
 inline constexpr SystemNetworks kPredictionNetworks{"prediction", "prediction-int8", "MAQ_PREDICTION_BUNDLE"};
+inline constexpr SystemNetworks kBodyNetworks{"body", "body", "MAQ_BODY_BUNDLE"};
 
 // The systems of this build.
 std::vector<SystemNetworks> networks_of_build();

@@ -13,6 +13,7 @@ void add_play_command(CLI::App& app, int* exit_code);
 void add_predict_command(CLI::App& app, int* exit_code);
 void add_novelty_command(CLI::App& app, int* exit_code);
 void add_record_command(CLI::App& app, int* exit_code);
+void add_body_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);
 void add_edges_command(CLI::App& app, int* exit_code);
 void add_head_command(CLI::App& app, int* exit_code);

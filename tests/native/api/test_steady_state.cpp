@@ -185,6 +185,41 @@ TEST(SteadyState, DepthFramesTakeNothingFromTheHeap) {
   }
 }
 
+TEST(SteadyState, BodiesTakeNothingFromTheHeap) {
+  const maquette::Context context;
+  maquette::DensePose densepose(context, MAQ_TEST_MODELS "/densepose-b-int8");
+  maquette::Source source(context, "image:" MAQ_TEST_MEDIA "/photo.jpg");
+  const maquette::Frame frame = std::move(*source.next());
+  const maquette::DensePoseResult people = densepose.run(frame);
+  maq_body_config config = maquette::default_body_config();
+  config.model.bundle_path = MAQ_TEST_MODELS "/body";
+  maquette::Body body(context, config);
+  maq_body_input input = maquette::default_body_input();
+  input.width_px = people.width_px(), input.height_px = people.height_px();
+  const uint8_t** const planes[] = {&input.part, &input.u, &input.v, &input.person};
+  for (int32_t i = 0; i < 4; ++i) {
+    const auto plane = maq_densepose_plane(MAQ_DENSEPOSE_PLANE_PART + i);
+    ASSERT_EQ(maq_densepose_result_get_plane(people.get(), plane, planes[i], &input.stride_bytes), MAQ_OK);
+  }
+  input.person_count = 1;
+  const int64_t id = 1;
+  input.ids = &id;
+  const auto run = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      input.timestamp_ns += i % 4 == 3 ? 2'000'000'000 : 33'000'000;  // also starts without a frame before
+      maq_body_result* result = nullptr;
+      ASSERT_EQ(maq_body_run(body.get(), &input, &result), MAQ_OK);
+      maq_body_result_release(result);
+    }
+  };
+  run(6);
+  counting = true;
+  run(12);
+  counting = false;
+  const Allocations found = counted();
+  EXPECT_EQ(found.ours, 0) << found.where;
+}
+
 TEST(SteadyState, PredictedFramesTakeNothingFromTheHeap) {
   const maquette::Context context;
   for (const maq_predictor_method method : {MAQ_PREDICTOR_AUTO, MAQ_PREDICTOR_MOTION}) {

@@ -78,7 +78,7 @@ CameraPoseOptions prior_of(const HeadCamera& camera, double factor, double sigma
 
 double rotation_error(const CameraPose& pose, const HeadCamera& truth) {
   return maq::length(maq::head::log_rotation(pose.camera.head_to_camera.rotation *
-                                             maq::head::transposed(truth.head_to_camera.rotation)));
+                                             maq::transposed(truth.head_to_camera.rotation)));
 }
 
 double translation_error(const CameraPose& pose, const HeadCamera& truth) {
@@ -267,7 +267,7 @@ TEST(CameraPose, TheCovarianceIsThatOfTheErrors) {
       const CameraPose pose = find_camera_pose(head_points(camera, 60, 1, random), options);
       ASSERT_EQ(pose.status, PoseStatus::kFound);
       const Vec3 w = maq::head::log_rotation(camera.head_to_camera.rotation *
-                                             maq::head::transposed(pose.camera.head_to_camera.rotation));
+                                             maq::transposed(pose.camera.head_to_camera.rotation));
       const Vec3 t = camera.head_to_camera.translation - pose.camera.head_to_camera.translation;
       const double off[7] = {w.x, w.y, w.z, t.x, t.y, t.z, std::log(camera.focal_px / pose.camera.focal_px)};
       for (int i = 0; i < unknowns; ++i) {

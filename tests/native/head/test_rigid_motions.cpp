@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "head/camera/se3.h"
+#include "head/camera/head_camera.h"
 
 namespace {
 
@@ -17,7 +17,7 @@ const Vec3 kAxis = maq::normalized({0.3, -0.5, 0.8});
 // The exponential series, in long double: exp(w) = (exp(w / 2^k))^(2^k).
 Mat3 exp_by_series(Vec3 w) {
   long double m[9], sum[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, power[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const Mat3 cross = maq::head::cross_matrix(w);
+  const Mat3 cross = maq::cross_matrix(w);
   for (int i = 0; i < 9; ++i) m[i] = cross[size_t(i)];
   for (int k = 1; k < 40; ++k) {
     long double next[9] = {};

@@ -52,6 +52,10 @@ ALLOWED = {
         "export.bundle", "export.camera", "export.data_sources", "export.densepose", "export.onnx_graphs",
         "export.solids", "export.training",
     },
+    "export.body": {
+        "export.bundle", "export.checked_file", "export.data_sources", "export.keypoints", "export.people",
+        "export.surface", "export.surface_grid", "export.teachers",
+    },
     "export.heads": {
         "export.bundle", "export.camera", "export.checked_file", "export.data_sources", "export.densepose",
         "export.keypoints", "export.onnx_graphs", "export.people", "export.teachers", "export.training",
@@ -59,8 +63,8 @@ ALLOWED = {
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
-        "export.bundle", "export.densepose", "export.jobs", "export.keypoints", "export.people", "export.photos",
-        "export.shards", "export.surface", "export.teachers", "export.training",
+        "export.body", "export.bundle", "export.densepose", "export.jobs", "export.keypoints", "export.people",
+        "export.photos", "export.shards", "export.surface", "export.teachers", "export.training",
     },
     "quantization": {"export"},
     "benchmarks": {"export", "quantization"},

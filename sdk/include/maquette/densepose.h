@@ -37,8 +37,8 @@ typedef enum maq_densepose_crops {
 /* Options. 0 is the default in every field; `model` has its own (types.h).
  *
  * Frames with a `sequence` above 0, and all frames with key_frame_interval above 1, are frames of a stream. In a
- * stream, a person who hardly moves is seen through the same pixels in each frame, and the surface is averaged over
- * the frames along the motion of people (`steadiness`). */
+ * stream, a person who hardly moves is seen through the same pixels in each frame. The surface is averaged over the
+ * frames, along the motion of people (`steadiness`). */
 typedef struct maq_densepose_config {
   uint32_t struct_size;
   maq_model_options model;     /* default bundle: share/maquette/models/densepose-b-int8, installed with the library */

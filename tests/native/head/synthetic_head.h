@@ -271,8 +271,7 @@ struct Noise {
 };
 
 inline double rotation_error(const HeadCamera& a, const HeadCamera& b) {
-  return maq::length(
-      maq::head::log_rotation(a.head_to_camera.rotation * maq::transposed(b.head_to_camera.rotation)));
+  return maq::length(maq::head::log_rotation(a.head_to_camera.rotation * maq::transposed(b.head_to_camera.rotation)));
 }
 
 // Camera points of an image's pixels, near and far, in the head's frame.

@@ -77,8 +77,8 @@ CameraPoseOptions prior_of(const HeadCamera& camera, double factor, double sigma
 }
 
 double rotation_error(const CameraPose& pose, const HeadCamera& truth) {
-  return maq::length(maq::head::log_rotation(pose.camera.head_to_camera.rotation *
-                                             maq::transposed(truth.head_to_camera.rotation)));
+  return maq::length(
+      maq::head::log_rotation(pose.camera.head_to_camera.rotation * maq::transposed(truth.head_to_camera.rotation)));
 }
 
 double translation_error(const CameraPose& pose, const HeadCamera& truth) {

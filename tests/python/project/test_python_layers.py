@@ -27,7 +27,8 @@ ALLOWED = {
     "export.onnx_graphs": {"export.bundle"},
     "export.photos": set(),
     "export.people": {
-        "export.camera", "export.jobs", "export.shards", "export.surface", "export.surface_grid", "export.xxh3",
+        "export.camera", "export.jobs", "export.keypoints", "export.shards", "export.surface", "export.surface_grid",
+        "export.xxh3",
     },
     "export.places": {"export.camera", "export.jobs", "export.people", "export.photos", "export.point_cloud"},
     "export.solids": {"export.camera", "export.jobs", "export.photos"},

@@ -29,7 +29,8 @@ class SteadySurface {
     int size = 0;
     std::vector<float> labels, surface;
   };
-  // What the frame before says of a cell: a weighted mean of four values that lie at `from`, and how much it counts.
+  // The answer of the frame before for a cell: a weighted mean of four values that lie at `from`. `share`: how much it
+  // counts.
   struct Source {
     size_t from[4];
     float weights[4];

@@ -20,7 +20,7 @@ help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
 
 .PHONY: demo
-demo: build  ## dense pose on a bundled photo and clip, what the clip shows next, a turning head, flights through a room and a real box, into demo-output/ (no torch)
+demo: build  ## dense pose on a bundled photo and clip, a moving body, what the clip shows next, a turning head, flights through a room and a real box, into demo-output/ (no torch)
 	@scripts/demo.sh $(OUT)
 
 .PHONY: build

@@ -18,9 +18,13 @@ fi
 mkdir -p "$out"
 "$maquette" info
 for source in image:tests/media/photo.jpg video:tests/media/clip.mp4; do
-    printf '\n== maquette densepose %s --out %s --overlay\n' "$source" "$out"
-    "$maquette" densepose "$source" --out "$out" --overlay
+    printf '\n== maquette densepose %s --out %s --overlay --keypoints\n' "$source" "$out"
+    "$maquette" densepose "$source" --out "$out" --overlay --keypoints
 done
+
+# A body of the person in the clip, moving: glTF for viewers, BVH for animation programs.
+printf '\n== maquette body tests/media/clip.mp4 --out %s/body.glb --bvh %s/body.bvh\n' "$out" "$out"
+"$maquette" body tests/media/clip.mp4 --out "$out/body.glb" --bvh "$out/body.bvh"
 
 # A head of the person in the photo with the photo as its texture, and a clip of it turning.
 printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"

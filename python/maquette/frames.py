@@ -113,7 +113,7 @@ class Frame(NativeObject):
     (RGBA) or [H, W] (grey), uint16 [H, W] (depth in millimetres) or float32 [H, W] (depth in metres). Images of Pillow,
     tensors on the CPU, and other objects that numpy reads work, too. Don't write to the array while a model reads it.
     intrinsics: of the camera, for the array's size; edges need them. sequence: from 0 for the frames of a stream, whose
-    earlier frames then count (ids of people, steady labels). Frames of a `Source` have the time, the number
+    earlier frames then count (ids of people, steady surface). Frames of a `Source` have the time, the number
     and, if they are known, the intrinsics of the camera. Raises ValueError for an array that is no such image.
     """
 

@@ -50,7 +50,7 @@ pack() {
     tar --create --directory "$work" --sort=name --mtime="@$epoch" --owner=0 --group=0 --numeric-owner \
         --mode=u+w,go=rX "$name" | gzip -n -9 >"$dist/$name.tar.gz"
 }
-systems=(densepose scenes edges heads prediction)
+systems=(densepose scenes edges heads prediction body)
 for build in build/wheel-*/; do
     machine="$(basename "${build#build/wheel-}")"
     pack "maquette-$version-linux-$machine" "$machine" runtime development tools "${systems[@]/#/models-}"

@@ -27,7 +27,7 @@ DIST = Path(os.environ.get("MAQ_RELEASE", ROOT / "build/dist"))
 KEY = Path(os.environ.get("MAQ_MINISIGN_PUBLIC_KEY", Path(__file__).with_name("TEST-ONLY.pub")))
 VERSION = re.search(r"project\(maquette VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
 MACHINE = platform.machine()
-SYSTEMS = ("densepose", "scenes", "edges", "heads", "prediction")
+SYSTEMS = ("densepose", "scenes", "edges", "heads", "prediction", "body")
 KINDS = {
     f"maquette-{VERSION}-py3-none-manylinux_2_28_{MACHINE}.whl",
     f"maquette-{VERSION}-linux-{MACHINE}.tar.gz",

@@ -61,7 +61,7 @@ def nearest_on_triangles(points: np.ndarray, corners: np.ndarray) -> tuple[np.nd
     """points [K, 3], corners [F, 3, 3]. For each point the nearest triangle [K], the fractions of its three vertices
     [K, 3] and the distance [K] (Ericson, "Real-time collision detection", 5.1.5)."""
     tree = cKDTree(corners.mean(1))
-    candidates = tree.query(points, k=min(_NEAR_TRIANGLES, len(corners)))[1]
+    candidates = tree.query(points, k=np.arange(1, min(_NEAR_TRIANGLES, len(corners)) + 1))[1]
     a, b, c = (corners[candidates][:, :, k] for k in range(3))
     ab, ac, ap = b - a, c - a, points[:, None] - a
     dot = lambda u, v: (u * v).sum(-1)  # noqa: E731

@@ -62,7 +62,7 @@ TEST_F(BodyCommandLine, WhatCannotBeDoneIsASentence) {
   };
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg'", "give --out body.glb, --bvh body.bvh or --json");
   expect_error("'stub:grey' --out a.glb", "stub:grey");
-  expect_error("'stub:noise' --max-frames 2 --out a.glb", "nothing was written");
+  expect_error("'stub:pattern' --max-frames 2 --out a.glb", "nothing was written");
   EXPECT_FALSE(exists("a.glb"));
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.obj", "must end with .glb");
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.glb --body-bundle none", "none");

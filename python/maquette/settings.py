@@ -115,7 +115,7 @@ class DensePoseSettings(ModelSettings, total=False):
     (default): they are not."""
 
     steadiness: float
-    """In a stream: how much the frames before count for parts, U and V, up to 0.95; 0 (default): 0.8; -1: not at all.
+    """In a stream: how much the frames before count for parts, U and V, up to 0.95; 0 (default): 0.9; -1: not at all.
     Larger values flicker less."""
 
 

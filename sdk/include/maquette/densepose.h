@@ -66,7 +66,7 @@ typedef struct maq_densepose_config {
   int32_t has_keypoints;            /* 1: keypoints of each person are found (maq_densepose_result_get_keypoints), for
                                        about a millisecond a person; 0 (default): they are not */
   float steadiness;                 /* in a stream: how much the frames before count for parts, U and V, up to 0.95;
-                                       0 (default): 0.8; -1: not at all. Larger values flicker less. */
+                                       0 (default): 0.9; -1: not at all. Larger values flicker less. */
 } maq_densepose_config;
 
 typedef struct maq_densepose_person {

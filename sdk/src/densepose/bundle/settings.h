@@ -15,7 +15,7 @@ struct DensePoseSettings {
   int max_people = 0;
   int max_proposals = 0;
   int key_frame_interval = 1;
-  float steadiness = 0.8f;  // of the surface in a stream, from 0 (off) to below 1
+  float steadiness = 0.9f;  // of the surface in a stream, from 0 (off) to below 1
   int min_person_height_px = 0;
   PersonCrops crops = PersonCrops::kOff;
   int crop_side_px = 0;

@@ -66,7 +66,7 @@ class DensePose internal constructor(pointer: Long) : AutoCloseable {
      * @property resultPoolSize results that the app may hold at once, 1 to 64; 0: 4.
      * @property keyFrameInterval 0 and 1: people are detected in each frame; N: in every N-th frame of a stream.
      * @property hasKeypoints whether [Person.keypoints] are found.
-     * @property steadiness in a stream: how much the frames before count for parts, U and V, up to 0.95; 0: 0.8; -1: not
+     * @property steadiness in a stream: how much the frames before count for parts, U and V, up to 0.95; 0: 0.9; -1: not
      *   at all.
      * @property minPersonHeightPx people less tall than this in the frame may be missed.
      * @property provider networks for which it cannot be had, or of which it takes less than half, run on the CPU;

@@ -91,10 +91,12 @@ void sample_person(const BodyModel& model, const LabelImage& image, uint8_t numb
   found.points.clear();
   found.size_px = std::sqrt(double(pixels.count));
   const double step = std::max(1.0, std::sqrt(double(pixels.count) / target));
-  for (double fine_y = pixels.top + step / 2 - 0.5; fine_y < pixels.bottom; fine_y += step) {
-    const int y = std::min(int(fine_y + 0.5), image.height_px - 1);
-    for (double fine_x = pixels.left + step / 2 - 0.5; fine_x < pixels.right; fine_x += step) {
-      const int x = std::min(int(fine_x + 0.5), image.width_px - 1);
+  // The steps whose middles lie within a length.
+  const auto count_of = [&](int length) { return int(std::ceil((length + 0.5) / step - 0.5)); };
+  for (int row = 0; row < count_of(pixels.bottom - pixels.top); ++row) {
+    const int y = std::min(int(pixels.top + (row + 0.5) * step), image.height_px - 1);
+    for (int column = 0; column < count_of(pixels.right - pixels.left); ++column) {
+      const int x = std::min(int(pixels.left + (column + 0.5) * step), image.width_px - 1);
       const size_t at = size_t(y) * image.stride_bytes + size_t(x);
       if (image.person != nullptr && image.person[at] != number) continue;
       const int part = image.part[at];

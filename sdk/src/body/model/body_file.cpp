@@ -43,7 +43,7 @@ void read_joints(CheckedBytes& file, const BodyFileHead& head, const std::vector
   for (BodyJoint& joint : model.joints) {
     const std::vector<uint8_t> text = file.bytes(file.number<uint8_t>());
     joint.name.assign(text.begin(), text.end());
-    joint.parent = file.number<int8_t>();
+    joint.parent = int{file.number<int8_t>()};  // NOLINT(bugprone-signed-char-misuse): -1 is no parent
   }
   const auto rest = stored<int16_t>(file, 3 * size_t(head.joints));
   const auto basis = stored<int16_t>(file, 3 * size_t(head.joints) * head.shapes);

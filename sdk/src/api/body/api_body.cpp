@@ -11,8 +11,8 @@ using namespace maq;
 
 namespace {
 
-constexpr uint32_t kResultPool = 4, kMaxResultPool = 64, kMaxPeople = 255;
-constexpr int32_t kMaxSide_px = 16384;
+constexpr uint32_t kBodyResults = 4, kMaxBodyResults = 64, kMaxBodies = 255;
+constexpr int32_t kMaxPlaneSide_px = 16384;
 constexpr const char* kAngleNames[] = {"left_elbow", "right_elbow", "left_knee",     "right_knee",
                                        "left_hip",   "right_hip",   "left_shoulder", "right_shoulder"};
 static_assert(std::size(kAngleNames) == MAQ_BODY_ANGLE_COUNT && body::kAngles == MAQ_BODY_ANGLE_COUNT);
@@ -34,12 +34,12 @@ maq_body_input default_body_input() {
 }
 
 body::LabelImage labels_of(const maq_body_input& input) {
-  require_range("input.width_px", input.width_px, 1, kMaxSide_px);
-  require_range("input.height_px", input.height_px, 1, kMaxSide_px);
+  require_range("input.width_px", input.width_px, 1, kMaxPlaneSide_px);
+  require_range("input.height_px", input.height_px, 1, kMaxPlaneSide_px);
   require_argument(input.part, "input.part");
   require_argument(input.u, "input.u");
   require_argument(input.v, "input.v");
-  require_range("input.person_count", input.person_count, 0u, kMaxPeople);
+  require_range("input.person_count", input.person_count, 0u, kMaxBodies);
   if (input.person == nullptr) require_range("input.person_count without input.person", input.person_count, 0u, 1u);
   const size_t stride = input.stride_bytes == 0 ? size_t(input.width_px) : input.stride_bytes;
   if (stride < size_t(input.width_px)) {
@@ -140,10 +140,10 @@ maq_status maq_body_create(maq_context* context, const maq_body_config* given, m
     require_argument(body, "body");
     const maq_body_config config = read_config(given, "config", default_body_config());
     require_model_options("config.model", config.model);
-    require_range("config.result_pool_size", config.result_pool_size, 0u, kMaxResultPool);
+    require_range("config.result_pool_size", config.result_pool_size, 0u, kMaxBodyResults);
     const Bundle bundle = read_bundle_argument(config.model, "config.model", kBodyBundle);
     *body = new maq_body(body::model_of_bundle(bundle),
-                         config.result_pool_size == 0 ? kResultPool : config.result_pool_size);
+                         config.result_pool_size == 0 ? kBodyResults : config.result_pool_size);
     context->state->log().write(MAQ_LOG_INFO, "Bundle ", bundle.manifest.name, " ", bundle.manifest.version, " loaded");
     return MAQ_OK;
   });

@@ -11,16 +11,17 @@
 namespace maq::body {
 namespace {
 
-constexpr double kCentimetres = 100, kDegrees = 57.29577951308232, kDefaultFrame_s = 1.0 / 30;
+constexpr double kCentimetres = 100, kDegreesInRadian = 57.29577951308232, kDefaultFrame_s = 1.0 / 30;
 constexpr char kRotations[] = "Zrotation Xrotation Yrotation";
 
 // Angles about z, x and y of a rotation Rz Rx Ry, degrees.
 Vec3 angles_of(const Mat3& r) {
   const double sine = std::clamp(r[7], -1.0, 1.0);
   if (std::abs(sine) > 1 - 1e-12) {  // z and y turn about one axis: all of it to z
-    return {kDegrees * std::atan2(r[3], r[0]), kDegrees * std::asin(sine), 0};
+    return {kDegreesInRadian * std::atan2(r[3], r[0]), kDegreesInRadian * std::asin(sine), 0};
   }
-  return {kDegrees * std::atan2(-r[1], r[4]), kDegrees * std::asin(sine), kDegrees * std::atan2(-r[6], r[8])};
+  return {kDegreesInRadian * std::atan2(-r[1], r[4]), kDegreesInRadian * std::asin(sine),
+          kDegreesInRadian * std::atan2(-r[6], r[8])};
 }
 
 class BvhText {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kLimitPrecision = 100;  // of an angle beyond its limit, by radian squared
 constexpr double kHiddenCost = 1;        // of a point behind the camera, by the largest cost of an observation
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kImpossible = std::numeric_limits<double>::infinity();
 
 Vec3 rotation_row(const Mat3& m, Vec3 a) {
   // a^T m
@@ -184,22 +184,22 @@ double FitEquations::add_priors(const FitProblem& problem, const BodyPose& pose,
 }
 
 double FitEquations::cost(const FitProblem& problem, const BodyPose& pose) {
-  if (!is_finite(pose, model_.joints.size())) return kInfinite;
+  if (!is_finite(pose, model_.joints.size())) return kImpossible;
   bones_ = bones_of(model_, pose);
-  if (problem.camera.is_perspective && !(pose.place.z >= kNearest_m)) return kInfinite;
+  if (problem.camera.is_perspective && !(pose.place.z >= kNearest_m)) return kImpossible;
   const double sum = add_observations(problem, pose, false) + add_priors(problem, pose, false);
-  return std::isfinite(sum) ? sum : kInfinite;
+  return std::isfinite(sum) ? sum : kImpossible;
 }
 
 double FitEquations::linearize(const FitProblem& problem, const BodyPose& pose) {
-  if (!is_finite(pose, model_.joints.size())) return kInfinite;
+  if (!is_finite(pose, model_.joints.size())) return kImpossible;
   const size_t count = unknown_count(model_);
   for (size_t i = 0; i < count; ++i) std::fill_n(matrix_.begin() + std::ptrdiff_t(i * kMaxUnknowns), i + 1, 0.0);
   gradient_.fill(0);
   bones_ = bones_of(model_, pose);
   prepare_derivatives(pose);
   const double sum = add_observations(problem, pose, true) + add_priors(problem, pose, true);
-  return std::isfinite(sum) ? sum : kInfinite;
+  return std::isfinite(sum) ? sum : kImpossible;
 }
 
 BodyPose stepped(const BodyModel& model, const BodyPose& pose, const double* step, double max_shape) {

@@ -45,7 +45,7 @@ double cosine_between(const Mat3& a, const Mat3& b) {
 
 }  // namespace
 
-StartingPoses::StartingPoses(const BodyModel& model) : model_(model), mean_(mean_pose(model)) {
+StartingPoses::StartingPoses(const BodyModel& model) : mean_(mean_pose(model)) {
   BodyPose pose = mean_;
   pose.orientation = kIdentity3;
   bones_ = bones_of(model, pose);

@@ -26,7 +26,6 @@ class StartingPoses {
     double error = 0, scale = 0;
   };
 
-  const BodyModel& model_;
   BodyPose mean_;
   BodyBones bones_;  // of the mean pose in body axes
   std::vector<Candidate> candidates_;

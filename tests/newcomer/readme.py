@@ -25,6 +25,7 @@ PROMISES = {
     "maquette edges": "results/box_depth_edges.json",
     "scene build": "room.maqs",
     "head photo.jpg": "head.glb",
+    "maquette body": "body.glb",
     "scene render": "room.mp4",
     "./people": PRINTS + r"person 0\.\d+ at x \d+ y \d+",
     "make wheel": "build/wheel/maquette-*.whl",

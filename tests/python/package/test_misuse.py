@@ -96,6 +96,11 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     densepose = create("maq_densepose", n.context, model("maq_densepose_config", DATA / "tiny_bundle"))
     create("maq_densepose_result", densepose, frame, function="maq_densepose_run",
            release="maq_densepose_result_release")  # fmt: skip
+    planes, labels = n.ffi.new("uint8_t[]", 256), n.config("maq_body_input", {"width_px": 16, "height_px": 16})
+    labels.part = labels.u = labels.v = planes
+    body = create("maq_body", n.context, model("maq_body_config", MODELS / "body"))
+    create("maq_body_result", body, labels, function="maq_body_run", release="maq_body_result_release")
+    create("maq_body_clip", body)
     create("maq_model", n.context, n.ffi.NULL, function="maq_densepose_model_create", release="maq_model_destroy")
     n.call("maq_predictor_push", create("maq_predictor", n.context, n.ffi.NULL), frame)
     novelty = create("maq_novelty", n.context, model("maq_novelty_config", DATA / "tiny_prediction/bundle"))
@@ -135,7 +140,7 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     create("maq_recorder", n.context, bytes(folder / "a.maqrec"), n.ffi.NULL, n.ffi.NULL)
     create("maq_clip", n.context, bytes(folder / "a.mp4"), 10)
     create("maq_camera_list", n.context)
-    return SimpleNamespace(n=n, made=made, kept=[xyz, grey, plain])
+    return SimpleNamespace(n=n, made=made, kept=[xyz, grey, plain, planes])
 
 
 def valid(objects: SimpleNamespace, function: str) -> list[object]:

@@ -38,6 +38,7 @@ COMMANDS = {
     "edges info": [],
     "head": [f"{MEDIA}/photo.jpg", "--seconds", "0", "--cell", "8", "--save", "{}/head.maqh", "--out", "{}/head.glb"],
     "head info": ["{}/head.maqh"],
+    "body": [f"image:{MEDIA}/photo.jpg?size=256x256", "--out", "{}/body.glb"],
     "head render": ["{}/head.maqh", "--cell", "8", "--size", "80x60", "--out", "{}/head.png"],
     "scene build": [f"{MEDIA}/room", "--points", "2000", "--views", "2", "--long-side", "160", "--out", "{}/room.maqs"],
     "scene render": ["{}/room.maqs", "--path", "orbit", "--size", "80x60", "--seconds", "0.1", "--out", "{}/room.mp4"],

@@ -73,7 +73,7 @@ def test_the_wheel_says_what_it_is_and_holds_licences(wheel):
     assert not [name for name in names if "demo" in name or name.startswith("build")]
     assert not [name for name in names if "/models/" in name]
     models = {path.name.split("-")[0]: path for path in wheel.parent.glob("maquette_models_*")}
-    assert len(models) == 5
+    assert len(models) == 6
     # Library, command line, ONNX Runtime (8.4 MB) and the networks of dense pose (2 MB).
     assert wheel.stat().st_size + models["maquette_models_densepose"].stat().st_size < 14e6
 

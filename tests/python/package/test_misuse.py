@@ -96,7 +96,10 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     densepose = create("maq_densepose", n.context, model("maq_densepose_config", DATA / "tiny_bundle"))
     create("maq_densepose_result", densepose, frame, function="maq_densepose_run",
            release="maq_densepose_result_release")  # fmt: skip
-    planes, labels = n.ffi.new("uint8_t[]", 256), n.config("maq_body_input", {"width_px": 16, "height_px": 16})
+    planes, labels = (
+        n.ffi.new("uint8_t[]", 256),
+        n.config("maq_body_input", {"width_px": 16, "height_px": 16, "person_count": 1}),
+    )
     labels.part = labels.u = labels.v = planes
     body = create("maq_body", n.context, model("maq_body_config", MODELS / "body"))
     create("maq_body_result", body, labels, function="maq_body_run", release="maq_body_result_release")

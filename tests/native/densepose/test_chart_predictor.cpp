@@ -6,6 +6,7 @@
 #include "densepose/surface/chart_predictor.h"
 #include "support/expect_error.h"
 
+namespace chart_predictor_tests {
 namespace {
 
 constexpr int kParts = 5, kChannels = 11, kSize = 6;
@@ -76,3 +77,4 @@ TEST(ChartPredictor, BytesThatAreNoWeightsAreRefused) {
 }
 
 }  // namespace
+}  // namespace chart_predictor_tests

@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+namespace keypoint_decode_tests {
 namespace {
 
 constexpr int kSize = 64;
@@ -113,3 +114,4 @@ TEST(KeypointDecode, LogitsThatAreNotFiniteGiveNoConfidence) {
 }
 
 }  // namespace
+}  // namespace keypoint_decode_tests

@@ -5,6 +5,7 @@
 
 #include "densepose/detector/roi_align.h"
 
+namespace roi_align_tests {
 namespace {
 
 using maq::Box;
@@ -116,3 +117,4 @@ TEST_F(RoiAlign, EqualsTheReferenceOnRandomBoxes) {
 }
 
 }  // namespace
+}  // namespace roi_align_tests

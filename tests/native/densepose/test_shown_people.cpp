@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+namespace shown_people_tests {
 namespace {
 
 using Boxes = std::vector<maq::ScoredBox>;
@@ -65,3 +66,4 @@ TEST(ShownPeople, BoxesWithoutAreaAndNotANumberMatchNobody) {
 }
 
 }  // namespace
+}  // namespace shown_people_tests

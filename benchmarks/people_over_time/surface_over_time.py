@@ -11,7 +11,7 @@ from export.surface import LIMB_SIDE
 from export.surface_grid import SurfaceGrid
 
 STEP = 2  # every second pixel each way is looked at
-MOVES_CM = 0.5  # from this much of the surface a frame on, a pixel shows somebody who moves
+MOVES_CM = 0.5  # a pixel shows motion if its true surface point moves by this or more in a frame
 _MAX_ERROR_CM = 25.0  # a farther point is another part's: counted by the parts, not as a tremble
 
 
@@ -30,11 +30,14 @@ class SurfaceScores:
     lags_cm: list[np.ndarray] = field(default_factory=list)
 
     def figures(self) -> dict[str, float]:
-        """part: of the people's pixels, those with the right part (not painted is wrong). left/right: of limbs painted
-        as limbs. Where nobody moves: flips: changes of a pixel's painted part in a second; tremble p50, p90: change of
-        the surface's error from frame to frame, cm. error: mean
-        distance from the true surface point where the part is right, cm. lag: mean of that error along the motion,
-        where somebody moves, cm; above 0 the surface is where it was before."""
+        """part: share of the people's pixels with the right part; pixels that are not painted are wrong. left/right:
+        share of the limb pixels painted as a limb that have the right side. error: mean distance from the true surface
+        point, where the part is right, cm.
+
+        Pixels without motion: flips: changes of the painted part in a second. tremble p50, p90: change of the
+        surface's error from frame to frame, cm. Pixels with motion: lag: mean error along the motion, cm. Above 0, the
+        painted surface is at an earlier place.
+        """
         tremble, error, lag = (_all_of(parts) for parts in (self.trembles_cm, self.errors_cm, self.lags_cm))
         return {
             "part": self.right / max(self.asked, 1),

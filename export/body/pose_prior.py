@@ -56,7 +56,7 @@ def bone_of(joint: str) -> str:
 
 
 def local_rotations(body: Body, rotations: np.ndarray) -> np.ndarray:
-    """Rotations [B, 3, 3] of the body's bones to those of the 19 joints relative to their parents, [19, 3, 3]."""
+    """Rotations of the 19 joints relative to their parents, [19, 3, 3]. rotations: [B, 3, 3] of the body's bones."""
     turn = np.stack([rotations[body.bone[bone_of(name)]] for name in JOINTS])
     return np.stack([turn[k] if p < 0 else turn[p].T @ turn[k] for k, p in enumerate(PARENT)])
 

@@ -6,7 +6,7 @@
 Distances are in millimetres after a similarity transform (Procrustes), so size, place and orientation do not count, and
 before it, from the pelvis, in axes of the camera. `true` fits to the exact labels, `network` to those of dense pose.
 `baseline` is the mean body in the mean pose of the prior. A person counts where the image shows at least --min-pixels
-of them; `whole` are those of whom it shows at least 12 of the 15 joints.
+of them; `whole`: people with at least 12 of the 15 joints in the image.
 """
 
 from __future__ import annotations

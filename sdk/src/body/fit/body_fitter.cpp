@@ -13,7 +13,7 @@ constexpr size_t kMinPoints = 24;
 constexpr double kMinInliers = 0.4, kMinWarmInliers = 0.6;
 constexpr double kFirstDamping = 1e-3, kMaxDamping = 1e8, kMinDamping = 1e-7;
 constexpr double kSmallDecrease = 2e-4;  // of the cost: the fit has converged
-constexpr double kWideErrors = 3;        // robust_errors of the first iterations, by those of the rest
+constexpr double kWideErrors = 3;        // the first iterations multiply robust_errors by this
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kSeenWeight = 2;  // of the points of a joint's bones that make it a seen one
 

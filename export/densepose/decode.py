@@ -127,7 +127,7 @@ def infer(
     network, config = network or NetworkConfig(), config or DecodeConfig()
     height, width = image.shape[:2]
     found = detect(graphs, image, network, config)
-    iuv, instance = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.uint8)
+    canvas = Canvas.of_size(height, width)
     inner = (round(height / found.scale[1]), round(width / found.scale[0]))
     regions = regions_of(found.boxes, *inner)
     points = None
@@ -140,12 +140,12 @@ def infer(
     painted: list[int] = []
     for k, region in enumerate(regions * to_image):
         # A box without a body is a false alarm; one whose body is another person's already shows that person again.
-        if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, iuv, instance, config):
+        if paint([m[k] for m in maps], region.tolist(), len(painted) + 1, canvas, config):
             painted.append(k)
     keypoint = np.zeros((0, keypoints.COUNT, 3), np.float32) if graphs.keypoints else None
     if points is not None:
         keypoint = keypoints_of(points[painted], regions[painted] * to_image).numpy()
-    return Result(boxes[painted].numpy(), found.scores[painted].numpy(), iuv, instance, keypoint)
+    return Result(boxes[painted].numpy(), found.scores[painted].numpy(), canvas.iuv, canvas.instance, keypoint)
 
 
 def keypoints_of(logits: Tensor, regions: Tensor) -> Tensor:
@@ -202,19 +202,36 @@ def _box_pass(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, b
     return boxes[keep], scores[keep]
 
 
-def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, instance: np.ndarray,
-          config: DecodeConfig) -> int:  # fmt: skip
-    """Writes one person's labels into the still empty pixels of its box; returns how many it wrote.
+@dataclass
+class Canvas:
+    """What people are painted into. iuv: uint8 [H, W, 3]. instance: uint8 [H, W], the person from 1. odds: int8 [H, W],
+    the log-odds of the painted person in eighths. painted: pixels of each person."""
 
-    Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes none and returns 0.
+    iuv: np.ndarray
+    instance: np.ndarray
+    odds: np.ndarray
+    painted: dict[int, int]
+
+    @classmethod
+    def of_size(cls, height: int, width: int) -> Canvas:
+        size = height, width
+        return cls(np.zeros((*size, 3), np.uint8), np.zeros(size, np.uint8), np.zeros(size, np.int8), {})
+
+
+def paint(maps: list[Tensor], box: list[float], number: int, canvas: Canvas, config: DecodeConfig) -> int:
+    """Writes one person's labels into the pixels of its box; returns how many it wrote.
 
     maps: coarse [15, s, s], index, u, v [25, s, s]. The box becomes whole pixels (floor of its corner, size
     at least 1). A pixel is painted where the coarse classes other than background together have a probability above
     `config.mask_threshold`, with the best of the 24 parts. (The best single class against background, as DensePose
     decodes, loses pixels between parts: each part's share is small there, their sum is not.) Log-odds and logits
     are resized bilinearly with half-pixel centres.
+
+    Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes none and returns 0.
+    Otherwise a pixel of another person goes to whoever has the higher log-odds there, unless the other person would
+    keep less than that fraction of its pixels.
     """
-    height, width = instance.shape
+    height, width = canvas.instance.shape
     x0, y0 = int(box[0]), int(box[1])
     w, h = max(int(box[2]) - x0, 1), max(int(box[3]) - y0, 1)
     x1, y1 = min(x0 + w, width), min(y0 + h, height)
@@ -226,14 +243,24 @@ def paint(maps: list[Tensor], box: list[float], number: int, iuv: np.ndarray, in
     least = math.log(config.mask_threshold / (1 - config.mask_threshold))
     part = torch.where(resized[0] > least, resized[1:].argmax(0) + 1, 0)
     chart = [_sampled(m, part).clamp(0, 1).mul(255).round() for m in (u, v)]
-    label = torch.stack([part.float(), *chart], -1).byte().numpy()[: y1 - y0, : x1 - x0]
-    body = label[..., 0] > 0
-    empty = (instance[y0:y1, x0:x1] == 0) & body
-    if empty.sum() < config.min_visible_fraction * body.sum():
+    inside = np.s_[: y1 - y0, : x1 - x0]
+    label = torch.stack([part.float(), *chart], -1).byte().numpy()[inside]
+    eighths = (resized[0] * 8).nan_to_num().clamp(-127, 127).add(0.5).floor().to(torch.int8).numpy()[inside]
+    window = np.s_[y0:y1, x0:x1]
+    owner, body = canvas.instance[window].copy(), label[..., 0] > 0
+    mine = (owner == 0) & body
+    if mine.sum() < config.min_visible_fraction * body.sum():
         return 0
-    iuv[y0:y1, x0:x1][empty] = label[empty]
-    instance[y0:y1, x0:x1][empty] = number
-    return int(empty.sum())
+    for other, had in canvas.painted.items():
+        lost = (owner == other) & body & (eighths > canvas.odds[window])
+        if had - lost.sum() >= config.min_visible_fraction * had:
+            canvas.painted[other] -= int(lost.sum())
+            mine |= lost
+    canvas.iuv[window][mine] = label[mine]
+    canvas.instance[window][mine] = number
+    canvas.odds[window][mine] = eighths[mine]
+    canvas.painted[number] = int(mine.sum())
+    return canvas.painted[number]
 
 
 def _sampled(maps: Tensor, channel: Tensor) -> Tensor:

@@ -97,6 +97,20 @@ class DensePoseResult:
         out[body] = np.round((1 - opacity) * out[body] + opacity * colours).astype(np.uint8)
         return out
 
+    def find_pixel(self, index: int, part: int, u: float, v: float) -> tuple[float, float, float] | None:
+        """The pixel of the person at `index` that shows a point of the body surface: x and y, where (0.5, 0.5) is the
+        middle of the first pixel, and how far its point is from the wanted point, in U and V. None if no pixel shows
+        the part. Works for the latest 8 results of a `DensePose`. Raises MaquetteError."""
+        n = native()
+        pixel, distance = n.ffi.new("float[2]"), n.ffi.new("float *")
+        function = "maq_densepose_result_find_pixel"
+        status = n.ask(function, self._lent.handle, index, part, u, v, pixel, distance)
+        if status == n.lib.MAQ_ERROR_NOT_FOUND:
+            return None
+        if status:
+            n.fail(function, status)
+        return pixel[0], pixel[1], distance[0]
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes <path>_IUV.png, <path>_INDS.png and <path>.json in the DensePose convention
         (docs/reference/formats.md). Works for the latest 8 results of a `DensePose`. Raises MaquetteError."""

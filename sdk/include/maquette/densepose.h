@@ -237,8 +237,8 @@ MAQ_API maq_status maq_densepose_result_get_keypoints(const maq_densepose_result
                                                       float keypoints[99]);
 
 /* Gets a plane: height_px rows of `*stride_bytes` bytes (maq_densepose_result_get_size). The pixels are inside the
- * result and valid until it is released. Neither pointer may be NULL. If people overlap, the person with the better
- * score is in front.
+ * result and valid until it is released. Neither pointer may be NULL. Where people overlap, a pixel belongs to the
+ * likelier person.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_densepose_result_get_plane(const maq_densepose_result* result, maq_densepose_plane plane,
                                                   const uint8_t** pixels, size_t* stride_bytes);

@@ -107,6 +107,7 @@
 #if MAQ_HAS_DENSEPOSE
 #include "maquette/densepose.h"
 #include "maquette/densepose_model.h"
+#include "maquette/densepose_texture.h"
 #endif
 #if MAQ_HAS_SCENES
 #include "maquette/capture.h"

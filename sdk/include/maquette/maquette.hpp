@@ -22,6 +22,7 @@
 #if MAQ_HAS_DENSEPOSE
 #include "maquette/densepose.hpp"
 #include "maquette/densepose_model.hpp"
+#include "maquette/densepose_texture.hpp"
 #endif
 #if MAQ_HAS_SCENES
 #include "maquette/scene.hpp"

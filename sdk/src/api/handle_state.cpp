@@ -42,6 +42,7 @@ constexpr const char* kKinds[] = {"no handle",
                                   "a maq_body",
                                   "a maq_body_result",
                                   "a maq_body_clip",
+                                  "a maq_densepose_texture",
                                   "a maq_pipeline_result"};
 static_assert(std::size(kKinds) == size_t(HandleKind::kPipelineResult) + 1);
 

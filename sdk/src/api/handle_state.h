@@ -39,6 +39,7 @@ enum class HandleKind : uint32_t {
   kBody,
   kBodyResult,
   kBodyClip,
+  kDensePoseTexture,
   kPipelineResult
 };
 

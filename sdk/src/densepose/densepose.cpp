@@ -352,7 +352,7 @@ void DensePose::paint_people(DensePoseResult& result) {
                                                            spec.min_visible_fraction, decode_memory_, result.planes)
                                     : paint_person(logits, person.region, number, spec.mask_threshold,
                                                    spec.min_visible_fraction, decode_memory_, result.planes);
-    result.stats.decoded.body_pixels += counts.body_pixels;
+    result.stats.decoded.body_pixels += counts.body_pixels - counts.won_pixels;
     result.stats.decoded.clamped_uv += counts.clamped_uv;
     // A box without a body is a false alarm; a box whose body is painted already shows the same person again.
     if (counts.body_pixels == 0) continue;

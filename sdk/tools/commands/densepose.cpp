@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -27,6 +28,7 @@ struct DensePoseOptions {
   ModelOptions model;
   std::string out;
   bool overlay = false;
+  bool textures = false;
   std::string colours = "default";
   bool json = false;
   double roll_deg = 0;
@@ -105,6 +107,32 @@ void print_frame(const DensePoseOptions& options, const std::string& stem, const
   }
 }
 
+// The textures of the people of a source, by id.
+class Textures {
+ public:
+  explicit Textures(const maquette::Context& context) : context_(context) {}
+
+  void add(const maquette::DensePoseResult& result, const maquette::Frame& frame) {
+    const std::vector<maq_densepose_person> people = result.people();
+    for (uint32_t i = 0; i < people.size(); ++i) {
+      auto found = of_id_.find(people[i].id);
+      if (found == of_id_.end() && of_id_.size() >= kMaxPeople) continue;
+      if (found == of_id_.end()) found = of_id_.emplace(people[i].id, maquette::DensePoseTexture(context_)).first;
+      found->second.add_person(result, i, frame);
+    }
+  }
+
+  // Writes <path>_person<id>_texture.png of each.
+  void save(const fs::path& path) {
+    for (auto& [id, texture] : of_id_) texture.save(path.string() + "_person" + std::to_string(id) + "_texture.png");
+  }
+
+ private:
+  static constexpr size_t kMaxPeople = 100;  // 1.6 MB each
+  const maquette::Context& context_;
+  std::map<int64_t, maquette::DensePoseTexture> of_id_;
+};
+
 // Runs one source to its end and writes its files.
 void run_source(const DensePoseOptions& options, const SourceArgument& argument, const maquette::Context& context,
                 maquette::Source& source, maquette::DensePose& densepose, Timings& timings) {
@@ -112,6 +140,7 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
   const bool of_clip = is_clip(source);
   ClipFile clip(context, fs::u8path(options.out) / fs::u8path(argument.stem + "_overlay.mp4"),
                 source.info().fps / double(options.limits.every));
+  Textures textures(context);
   const auto work = [&](const SourceFrame& given) {
     const maquette::DensePoseResult result = densepose.run(given.frame);
     const maq_densepose_stats stats = result.stats();
@@ -130,12 +159,14 @@ void run_source(const DensePoseOptions& options, const SourceArgument& argument,
     if (options.overlay && !of_clip) {
       frame_of(context, overlay).save((fs::u8path(options.out) / fs::u8path(given.stem + "_overlay.png")).string());
     }
+    if (options.textures) textures.add(result, given.frame);
     timings.add(stats);
     if (!of_clip || options.json) print_frame(options, given.stem, given.frame.desc(), stats);
     return std::to_string(stats.person_count) + " people";
   };
   const int64_t done = run_frames(argument, source, options.limits, options.json, work);
   const fs::path overlay_path = clip.finish();
+  textures.save(fs::u8path(options.out) / fs::u8path(argument.stem));
   if (!overlay_path.empty() && !options.json) {
     print_output("%s  %lld frames -> %s\n", argument.stem.c_str(), (long long)done, overlay_path.string().c_str());
   } else if (of_clip && !options.json) {
@@ -180,6 +211,8 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
+  command->add_flag("--textures", options->textures,
+                    "Also write the colours of each person on the body surface: <stem>_person<id>_texture.png");
   command
       ->add_option(
           "--colours", options->colours,
@@ -200,6 +233,7 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
       "  <stem>_INDS.png  index of the person a pixel belongs to, from 1; 0: background\n"
       "  <stem>.json      boxes in pixels, scores, ids; with --keypoints also keypoints: x, y, confidence\n"
+      "--textures writes the 24 charts of a person in 4 columns of 6, of all frames of a clip; alpha is the confidence.\n"
       "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"

@@ -61,7 +61,7 @@ struct Logits {
 maq::DecodeCounts paint(Logits& logits, const Box& box, uint8_t person, DensePlanes& planes,
                         float mask_threshold = 0.5f, float min_visible_fraction = 0) {
   Planes charts(logits.u, logits.v, logits.size);
-  maq::DecodeMemory memory;
+  static maq::DecodeMemory memory;  // as in the SDK, the same for all people
   return paint_person(logits.view(&charts), box, person, mask_threshold, min_visible_fraction, memory, planes);
 }
 
@@ -342,7 +342,7 @@ TEST(DenseDecode, NanLogitsNeverWin) {
   EXPECT_EQ(paint(logits, {0, 0, 4, 4}, 1, planes).body_pixels, 0);
 }
 
-TEST(DenseDecode, ThePersonPaintedFirstStaysInFront) {
+TEST(DenseDecode, OfEquallyLikelyPeopleTheFirstStaysInFront) {
   Logits logits(8);
   make_everybody_part(logits, 2);
   DensePlanes planes;
@@ -351,6 +351,38 @@ TEST(DenseDecode, ThePersonPaintedFirstStaysInFront) {
   EXPECT_EQ(paint(logits, {8, 0, 20, 10}, 2, planes).body_pixels, 80);
   EXPECT_EQ(planes.person[10], 1);
   EXPECT_EQ(planes.person[12], 2);
+}
+
+// Two people who overlap in 40 pixels; the second is likelier there.
+TEST(DenseDecode, APixelGoesToTheLikelierPerson) {
+  Logits first(8), second(8);
+  make_everybody_part(first, 2);
+  make_everybody_part(second, 5);
+  second.fill(second.coarse, 1, 6);
+  Planes charts(second.u, second.v, second.size);
+  maq::AffineMap to_cells;  // the box of the second person
+  to_cells.xx = 8.0 / 12, to_cells.shift_x = -8 * to_cells.xx, to_cells.yy = 0.8;
+  maq::DecodeMemory memory;
+  for (const float min_visible : {0.5f, 0.67f}) {  // two thirds of the first person remain
+    for (const bool is_rotated : {false, true}) {
+      DensePlanes planes;
+      planes.reset(20, 10);
+      EXPECT_EQ(paint_person(first.view(&charts), {0, 0, 12, 10}, 1, 0.5f, min_visible, memory, planes).body_pixels,
+                120);
+      const DenseLogits logits = second.view(&charts);
+      const maq::DecodeCounts counts =
+          is_rotated ? paint_rotated_person(logits, to_cells, 2, 0.5f, min_visible, memory, planes)
+                     : paint_person(logits, {8, 0, 20, 10}, 2, 0.5f, min_visible, memory, planes);
+      const bool wins = min_visible < 0.6f;
+      EXPECT_EQ(counts.body_pixels, wins ? 120 : 80);
+      EXPECT_EQ(counts.won_pixels, wins ? 40 : 0);
+      for (size_t x = 0; x < 20; ++x) {
+        const int owner = x < (wins ? 8u : 12u) ? 1 : 2;
+        EXPECT_EQ(planes.person[x], owner) << x;
+        EXPECT_EQ(planes.part[x], owner == 1 ? 2 : 5) << x;
+      }
+    }
+  }
 }
 
 TEST(DenseDecode, APersonMostlyHiddenByOthersLeavesNoTrace) {

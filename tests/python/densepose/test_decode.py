@@ -9,7 +9,7 @@ import torch
 
 from export.densepose import boxes as bx
 from export.densepose.config import DecodeConfig, NetworkConfig
-from export.densepose.decode import Graphs, infer, keypoints_of, paint
+from export.densepose.decode import Canvas, Graphs, infer, keypoints_of, paint
 from export.densepose.network import MobileParsingRCNN
 
 CONFIG = NetworkConfig()
@@ -141,33 +141,50 @@ def test_painted_where_the_person_is_likelier_than_the_threshold():
     coarse[:] = -torch.inf
     coarse[0], coarse[7] = 0.0, math.log(0.3 / 0.7)  # a person with probability 0.3
     for threshold, painted in ((0.5, 0), (0.31, 0), (0.29, 1600)):
-        iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
+        canvas = Canvas.of_size(40, 40)
         config = DecodeConfig(mask_threshold=threshold)
-        assert paint([coarse, index, u, v], [0, 0, 40, 40], 1, iuv, instance, config) == painted
-        assert instance.sum() == painted
+        assert paint([coarse, index, u, v], [0, 0, 40, 40], 1, canvas, config) == painted
+        assert canvas.instance.sum() == painted
 
 
 def test_the_first_person_stays_in_front():
     maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
     later = [m[0] for m in fake_graphs(part=7).dense_head(torch.zeros(1, 64, 32, 32))]
-    iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
-    paint(maps, [0, 0, 20, 20], 1, iuv, instance, HALF)
-    paint(later, [10, 10, 40, 40], 2, iuv, instance, HALF)
-    assert instance[15, 15] == 1
-    assert iuv[15, 15, 0] == 3
-    assert instance[30, 30] == 2
-    assert iuv[30, 30, 0] == 7
+    canvas = Canvas.of_size(40, 40)
+    paint(maps, [0, 0, 20, 20], 1, canvas, HALF)
+    paint(later, [10, 10, 40, 40], 2, canvas, HALF)
+    assert canvas.instance[15, 15] == 1
+    assert canvas.iuv[15, 15, 0] == 3
+    assert canvas.instance[30, 30] == 2
+    assert canvas.iuv[30, 30, 0] == 7
+
+
+def test_a_pixel_goes_to_the_likelier_person():
+    maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
+    likelier = [m[0].clone() for m in fake_graphs(part=7).dense_head(torch.zeros(1, 64, 32, 32))]
+    likelier[0][0] -= 2  # background
+    canvas = Canvas.of_size(40, 40)
+    assert paint(maps, [0, 0, 20, 40], 1, canvas, HALF) == 800
+    assert paint(likelier, [10, 0, 40, 40], 2, canvas, HALF) == 1200
+    assert canvas.painted == {1: 400, 2: 1200}
+    assert (canvas.instance[:, 10:20] == 2).all()
+    assert (canvas.iuv[:, 10:20, 0] == 7).all()
+    # Nobody is left with less than the fraction that must be visible.
+    canvas = Canvas.of_size(40, 40)
+    paint(maps, [0, 0, 20, 40], 1, canvas, HALF)
+    assert paint(likelier, [10, 0, 40, 40], 2, canvas, DecodeConfig(min_visible_fraction=0.51)) == 800
+    assert (canvas.instance[:, 10:20] == 1).all()
 
 
 def test_who_lies_mostly_on_others_leaves_no_trace():
     maps = [m[0] for m in fake_graphs(part=3).dense_head(torch.zeros(1, 64, 32, 32))]
-    iuv, instance = np.zeros((40, 40, 3), np.uint8), np.zeros((40, 40), np.uint8)
-    paint(maps, [0, 0, 20, 40], 1, iuv, instance, HALF)
-    before = iuv.copy()
-    second = [maps, [10, 0, 30, 40], 2, iuv, instance]  # half of its pixels are free
+    canvas = Canvas.of_size(40, 40)
+    paint(maps, [0, 0, 20, 40], 1, canvas, HALF)
+    before = canvas.iuv.copy()
+    second = [maps, [10, 0, 30, 40], 2, canvas]  # half of its pixels are free
     assert paint(*second, DecodeConfig(min_visible_fraction=0.51)) == 0
-    assert instance.max() == 1
-    assert np.array_equal(iuv, before)
+    assert canvas.instance.max() == 1
+    assert np.array_equal(canvas.iuv, before)
     assert paint(*second, DecodeConfig(min_visible_fraction=0.5)) == 400
 
 
@@ -175,10 +192,10 @@ def test_coarse_background_wins_over_a_part():
     coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
     coarse[:, :32] = 0
     coarse[0, :32] = 5.0
-    iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance, HALF)
-    assert not instance[:32].any()
-    assert instance[32:].all()
+    canvas = Canvas.of_size(64, 64)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, canvas, HALF)
+    assert not canvas.instance[:32].any()
+    assert canvas.instance[32:].all()
 
 
 def test_parts_count_together_against_background():
@@ -186,19 +203,19 @@ def test_parts_count_together_against_background():
     coarse[:] = 0
     coarse[0, :32], coarse[0, 32:] = 1.0, 3.0  # log(14) = 2.64 lies between
     index[0] = 20.0
-    iuv, instance = np.zeros((64, 64, 3), np.uint8), np.zeros((64, 64), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 64, 64], 1, iuv, instance, HALF)
-    assert instance[:31].all()
-    assert not instance[33:].any()
+    canvas = Canvas.of_size(64, 64)
+    paint([coarse, index, u, v], [0, 0, 64, 64], 1, canvas, HALF)
+    assert canvas.instance[:31].all()
+    assert not canvas.instance[33:].any()
 
 
 def test_coordinates_are_resized_with_half_pixel_centres():
     coarse, index, u, v = (m[0] for m in fake_graphs().dense_head(torch.zeros(1, 64, 32, 32)))
     u = (torch.arange(64) / 63).expand(25, 64, 64)
-    iuv, instance = np.zeros((30, 100, 3), np.uint8), np.zeros((30, 100), np.uint8)
-    paint([coarse, index, u, v], [0, 0, 100, 30], 1, iuv, instance, HALF)
+    canvas = Canvas.of_size(30, 100)
+    paint([coarse, index, u, v], [0, 0, 100, 30], 1, canvas, HALF)
     at = np.clip((np.arange(100) + 0.5) * 0.64 - 0.5, 0, 63)
-    assert np.abs(iuv[15, :, 1] - at / 63 * 255).max() <= 0.51
+    assert np.abs(canvas.iuv[15, :, 1] - at / 63 * 255).max() <= 0.51
 
 
 def test_a_keypoint_lies_in_the_middle_of_its_likeliest_cells():

@@ -104,6 +104,7 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     body = create("maq_body", n.context, model("maq_body_config", MODELS / "body"))
     create("maq_body_result", body, labels, function="maq_body_run", release="maq_body_result_release")
     create("maq_body_clip", body)
+    create("maq_densepose_texture", n.context, n.ffi.NULL)
     create("maq_model", n.context, n.ffi.NULL, function="maq_densepose_model_create", release="maq_model_destroy")
     n.call("maq_predictor_push", create("maq_predictor", n.context, n.ffi.NULL), frame)
     novelty = create("maq_novelty", n.context, model("maq_novelty_config", DATA / "tiny_prediction/bundle"))

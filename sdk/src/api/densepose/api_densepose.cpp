@@ -86,6 +86,12 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
   return settings;
 }
 
+void require_frame_of(const DensePlanes& planes, const ImageView& image) {
+  if (image.width_px == planes.width_px && image.height_px == planes.height_px) return;
+  throw ArgumentError("frame has ", image.width_px, " x ", image.height_px, " pixels, but result is of a frame of ",
+                      planes.width_px, " x ", planes.height_px, "; give the frame that it was computed from.");
+}
+
 float require_roll(float roll_rad) {
   require_range("roll_rad", roll_rad, -7.0f, 7.0f);
   return roll_rad;
@@ -284,11 +290,7 @@ maq_status maq_densepose_result_draw(const maq_densepose_result* result, const m
     maq_densepose_drawing drawing = read_config(given, "drawing", maq_densepose_drawing{});
     const DensePlanes& planes = result->result.planes;
     const ImageView* const image = frame == nullptr ? nullptr : &frame->frame.image;
-    if (image != nullptr && (image->width_px != planes.width_px || image->height_px != planes.height_px)) {
-      throw ArgumentError("frame has ", image->width_px, " x ", image->height_px,
-                          " pixels, but result is of a frame of ", planes.width_px, " x ", planes.height_px,
-                          "; give the frame that it was computed from.");
-    }
+    if (image != nullptr) require_frame_of(planes, *image);
     if (drawing.width_px == 0) drawing.width_px = planes.width_px - std::max(drawing.x_px, 0);
     if (drawing.height_px == 0) drawing.height_px = planes.height_px - std::max(drawing.y_px, 0);
     const auto is_inside = [](int begin, int size, int limit) {

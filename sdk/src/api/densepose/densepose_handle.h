@@ -18,6 +18,9 @@ DensePoseSettings densepose_settings(const maq_densepose_config& config, const c
 // Throws ArgumentError unless it is one.
 float require_roll(float roll_rad);
 
+// Throws ArgumentError unless `image`, of the argument `frame`, has the size of a result's planes.
+void require_frame_of(const DensePlanes& planes, const ImageView& image);
+
 }  // namespace maq
 
 struct maq_densepose_result : maq::HandleOf<maq::HandleKind::kDensePoseResult> {

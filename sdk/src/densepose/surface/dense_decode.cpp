@@ -229,14 +229,15 @@ class Painter {
       : size_(logits.size),
         person_(person),
         min_odds_(min_log_odds(mask_threshold)),
-        odds_(memory.odds),
-        best_(memory.best),
+        memory_(memory),
         planes_(planes),
         first_row_(std::max(0, rect.y)),
         end_row_(std::min(rect.y + rect.height, planes.height_px)),
         first_column_(std::max(0, rect.x)),
         end_column_(std::min(rect.x + rect.width, planes.width_px)) {
     classify_cells(logits, memory);
+    memory_.painted_odds.resize(planes.person.size());
+    memory_.won.clear();
   }
 
   int first_row() const { return first_row_; }
@@ -248,15 +249,76 @@ class Painter {
   // -1 for none; asked only where the cells around do not agree.
   template <class PartBetween>
   void paint(int x, int y, const Tap& row, const Tap& column, ChartSampler* charts, PartBetween&& part_between) {
-    if (!(bilinear(odds_.data(), size_, row, column) > min_odds_)) return;
+    const float odds = bilinear(memory_.odds.data(), size_, row, column);
+    if (!(odds > min_odds_)) return;
     const size_t pixel = size_t(y) * size_t(planes_.width_px) + size_t(x);
     if (planes_.person[pixel] != 0) {
       ++taken_;
+      if (in_eighths(odds) > memory_.painted_odds[pixel]) memory_.won.push_back({x, y});
       return;
     }
+    paint_pixel(pixel, odds, row, column, charts, part_between);
+  }
+
+  // Takes everything back where other people leave less than that fraction of the person. Otherwise calls
+  // `paint_won(x, y)` for each pixel that another person is to lose.
+  template <class PaintWon>
+  DecodeCounts finish(float min_visible_fraction, PaintWon&& paint_won) {
+    if (float(counts_.body_pixels) < min_visible_fraction * float(counts_.body_pixels + taken_)) {
+      unpaint();
+      return {};
+    }
+    keep_visible(min_visible_fraction);
+    for (const DecodeMemory::Pixel& pixel : memory_.won) paint_won(pixel.x, pixel.y);
+    counts_.won_pixels = int64_t(memory_.won.size());
+    memory_.pixel_count[person_] = counts_.body_pixels;
+    return counts_;
+  }
+
+  // Paints a pixel of the person, whoever had it.
+  template <class PartBetween>
+  void repaint(int x, int y, const Tap& row, const Tap& column, ChartSampler* charts, PartBetween&& part_between) {
+    const size_t pixel = size_t(y) * size_t(planes_.width_px) + size_t(x);
+    paint_pixel(pixel, bilinear(memory_.odds.data(), size_, row, column), row, column, charts, part_between);
+  }
+
+ private:
+  // Nobody loses so many pixels that less than this fraction remains.
+  void keep_visible(float min_visible_fraction) {
+    memory_.lost_count.fill(0);
+    for (const DecodeMemory::Pixel& pixel : memory_.won) ++memory_.lost_count[owner_of(pixel)];
+    const auto is_kept = [&](const DecodeMemory::Pixel& pixel) {
+      const size_t owner = owner_of(pixel);
+      const int64_t had = memory_.pixel_count[owner];
+      return float(had - memory_.lost_count[owner]) < min_visible_fraction * float(had);
+    };
+    memory_.won.erase(std::remove_if(memory_.won.begin(), memory_.won.end(), is_kept), memory_.won.end());
+    for (const DecodeMemory::Pixel& pixel : memory_.won) --memory_.pixel_count[owner_of(pixel)];
+  }
+
+  size_t owner_of(const DecodeMemory::Pixel& pixel) const {
+    return planes_.person[size_t(pixel.y) * size_t(planes_.width_px) + size_t(pixel.x)];
+  }
+
+  void unpaint() {
+    for (int y = first_row_; y < end_row_; ++y) {
+      const size_t start = size_t(y) * size_t(planes_.width_px);
+      for (size_t pixel = start + size_t(first_column_); pixel < start + size_t(end_column_); ++pixel) {
+        if (planes_.person[pixel] != person_) continue;
+        for (std::vector<uint8_t>* plane : {&planes_.part, &planes_.u, &planes_.v, &planes_.person})
+          (*plane)[pixel] = 0;
+      }
+    }
+  }
+
+  static int8_t in_eighths(float odds) { return int8_t(std::floor(std::clamp(8 * odds, -127.0f, 127.0f) + 0.5f)); }
+
+  template <class PartBetween>
+  void paint_pixel(size_t pixel, float odds, const Tap& row, const Tap& column, ChartSampler* charts,
+                   PartBetween&& part_between) {
     // A part that is largest in all four cells around a pixel is the largest between them.
-    const int16_t* const low = best_.data() + size_t(row.low) * size_t(size_);
-    const int16_t* const high = best_.data() + size_t(row.high) * size_t(size_);
+    const int16_t* const low = memory_.best.data() + size_t(row.low) * size_t(size_);
+    const int16_t* const high = memory_.best.data() + size_t(row.high) * size_t(size_);
     int part = low[column.low];
     if (part < 0 || low[column.high] != part || high[column.low] != part || high[column.high] != part) {
       part = part_between();
@@ -270,34 +332,19 @@ class Painter {
       planes_.v[pixel] = to_byte(point.v, &clamped);
     }
     planes_.person[pixel] = person_;
+    memory_.painted_odds[pixel] = in_eighths(odds);
     ++counts_.body_pixels;
     counts_.clamped_uv += clamped ? 1 : 0;
   }
 
-  // Takes everything back where people in front leave less than that fraction of the person.
-  DecodeCounts finish(float min_visible_fraction) {
-    if (float(counts_.body_pixels) >= min_visible_fraction * float(counts_.body_pixels + taken_)) return counts_;
-    for (int y = first_row_; y < end_row_; ++y) {
-      const size_t start = size_t(y) * size_t(planes_.width_px);
-      for (size_t pixel = start + size_t(first_column_); pixel < start + size_t(end_column_); ++pixel) {
-        if (planes_.person[pixel] != person_) continue;
-        for (std::vector<uint8_t>* plane : {&planes_.part, &planes_.u, &planes_.v, &planes_.person})
-          (*plane)[pixel] = 0;
-      }
-    }
-    return {};
-  }
-
- private:
   int size_;
   uint8_t person_;
   float min_odds_;
-  const std::vector<float>& odds_;
-  const std::vector<int16_t>& best_;
+  DecodeMemory& memory_;
   DensePlanes& planes_;
   int first_row_, end_row_, first_column_, end_column_;
   DecodeCounts counts_;
-  int64_t taken_ = 0;  // pixels of the person that belong to people in front
+  int64_t taken_ = 0;  // pixels of the person that belonged to other people
 };
 
 }  // namespace
@@ -382,7 +429,12 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
       });
     }
   }
-  return painter.finish(min_visible_fraction);
+  return painter.finish(min_visible_fraction, [&](int x, int y) {
+    const Tap &row = memory.rows[size_t(y - rect.y)], &column = memory.columns[size_t(x - rect.x)];
+    std::optional<ChartSampler> charts;
+    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+    painter.repaint(x, y, row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
+  });
 }
 
 MAQ_SIMD_CLONES DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
@@ -391,18 +443,28 @@ MAQ_SIMD_CLONES DecodeCounts paint_rotated_person(const DenseLogits& logits, con
   const float size = float(logits.size);
   Painter painter(logits, rotated_rect(to_cells.inverse(), logits.size, planes), person, mask_threshold, memory,
                   planes);
+  // Calls `paint` with the place of a pixel between the cells, if it lies there.
+  const auto between_cells = [&](int x, int y, const auto& paint) {
+    const Point cell = to_cells({x + 0.5, y + 0.5});
+    const float cell_x = float(cell.x), cell_y = float(cell.y);
+    if (!(cell_x >= 0 && cell_x <= size && cell_y >= 0 && cell_y <= size)) return;
+    const Tap row = tap_at(cell_y, logits.size), column = tap_at(cell_x, logits.size);
+    std::optional<ChartSampler> charts;
+    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+    paint(row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
+  };
   for (int y = painter.first_row(); y < painter.end_row(); ++y) {
     for (int x = painter.first_column(); x < painter.end_column(); ++x) {
-      const Point cell = to_cells({x + 0.5, y + 0.5});
-      const float cell_x = float(cell.x), cell_y = float(cell.y);
-      if (!(cell_x >= 0 && cell_x <= size && cell_y >= 0 && cell_y <= size)) continue;
-      const Tap row = tap_at(cell_y, logits.size), column = tap_at(cell_x, logits.size);
-      std::optional<ChartSampler> charts;
-      if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
-      painter.paint(x, y, row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
+      between_cells(x, y, [&](const Tap& row, const Tap& column, ChartSampler* charts, const auto& part_between) {
+        painter.paint(x, y, row, column, charts, part_between);
+      });
     }
   }
-  return painter.finish(min_visible_fraction);
+  return painter.finish(min_visible_fraction, [&](int x, int y) {
+    between_cells(x, y, [&](const Tap& row, const Tap& column, ChartSampler* charts, const auto& part_between) {
+      painter.repaint(x, y, row, column, charts, part_between);
+    });
+  });
 }
 
 }  // namespace maq

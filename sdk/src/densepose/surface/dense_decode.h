@@ -1,6 +1,7 @@
 // From the dense head's logits to the planes of a result.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -42,6 +43,7 @@ std::optional<Box> head_bounds(const DensePlanes& planes, uint8_t person);
 
 struct DecodeCounts {
   int64_t body_pixels = 0;
+  int64_t won_pixels = 0;  // of these: belonged to other people before
   int64_t clamped_uv = 0;
 };
 
@@ -52,12 +54,19 @@ struct ResizeTap {
   float fraction = 0;  // weight of `high`
 };
 
-// Scratch memory of painting a person; kept from person to person.
+// Scratch memory of painting a person; kept from person to person, and from frame to frame.
 struct DecodeMemory {
   std::vector<ResizeTap> rows, columns;
   std::vector<float> odds;       // of each cell: log(p / (1 - p)), p the probability that it shows the person
   std::vector<int16_t> best;     // of each cell the part, from 0; -1: none
   std::vector<float> mixed_row;  // logits of a row of cells
+  struct Pixel {
+    int x = 0, y = 0;
+  };
+  std::vector<int8_t> painted_odds;        // of each pixel that shows a person: the person's log-odds, in eighths
+  std::array<int64_t, 256> pixel_count{};  // of each person
+  std::array<int64_t, 256> lost_count{};   // of each person, to the person who is painted
+  std::vector<Pixel> won;                  // by the person who is painted
 };
 
 // The pixels a box is painted into: between the floors of its corners, at least one each way.
@@ -77,8 +86,12 @@ float min_log_odds(float mask_threshold);
 // Paints where the coarse classes other than background together have a probability above `mask_threshold` (log-odds of
 // each cell, resized bilinearly with half-pixel centres to the box's pixels): the best part of the index logits,
 // resized alike (of equal ones the lowest; background is not among them), with its U and V, resized alike and clamped
-// to [0, 1]. Pixels that already belong to a person, and pixels outside the image, are left alone; if less than
-// `min_visible_fraction` of the person's pixels remains, nothing is painted. `person` counts from 1.
+// to [0, 1]. Pixels outside the image are left alone. `person` counts from 1. All people of an image need the same
+// `memory`. Where two people meet:
+// - If other people have more than 1 - `min_visible_fraction` of the person's pixels, nothing is painted.
+// - Otherwise a pixel goes to whoever has the higher log-odds there (in eighths, up to 16; of equals the first), but
+// only
+//   if the other person keeps at least `min_visible_fraction` of its pixels.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
                           float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
 

@@ -361,22 +361,22 @@ TEST(DenseDecode, APixelGoesToTheLikelierPerson) {
   second.fill(second.coarse, 1, 6);
   Planes charts(second.u, second.v, second.size);
   maq::AffineMap to_cells;  // the box of the second person
-  to_cells.xx = 8.0 / 12, to_cells.shift_x = -8 * to_cells.xx, to_cells.yy = 0.8;
+  to_cells.xx = 8.0 / 20, to_cells.shift_x = -8 * to_cells.xx, to_cells.yy = 0.8;
   maq::DecodeMemory memory;
   for (const float min_visible : {0.5f, 0.67f}) {  // two thirds of the first person remain
     for (const bool is_rotated : {false, true}) {
       DensePlanes planes;
-      planes.reset(20, 10);
+      planes.reset(28, 10);
       EXPECT_EQ(paint_person(first.view(&charts), {0, 0, 12, 10}, 1, 0.5f, min_visible, memory, planes).body_pixels,
                 120);
       const DenseLogits logits = second.view(&charts);
       const maq::DecodeCounts counts =
           is_rotated ? paint_rotated_person(logits, to_cells, 2, 0.5f, min_visible, memory, planes)
-                     : paint_person(logits, {8, 0, 20, 10}, 2, 0.5f, min_visible, memory, planes);
+                     : paint_person(logits, {8, 0, 28, 10}, 2, 0.5f, min_visible, memory, planes);
       const bool wins = min_visible < 0.6f;
-      EXPECT_EQ(counts.body_pixels, wins ? 120 : 80);
+      EXPECT_EQ(counts.body_pixels, wins ? 200 : 160);
       EXPECT_EQ(counts.won_pixels, wins ? 40 : 0);
-      for (size_t x = 0; x < 20; ++x) {
+      for (size_t x = 0; x < 28; ++x) {
         const int owner = x < (wins ? 8u : 12u) ? 1 : 2;
         EXPECT_EQ(planes.person[x], owner) << x;
         EXPECT_EQ(planes.part[x], owner == 1 ? 2 : 5) << x;

@@ -102,6 +102,25 @@ TEST_F(PersonTracker, SomebodyWhoComesBackIsRecognisedAlsoFromBehind) {
   EXPECT_EQ(see({{500, kRedShirt, kDark, true}, {300, kBlueShirt, kGreenShirt}}), (Ids{1, 2}));
 }
 
+TEST_F(PersonTracker, SomebodyWhoComesBackInAnotherLightIsRecognisedAfterSomeTime) {
+  see({{50, kRedShirt, kDark}, {300, kBlueShirt, kGreenShirt}});
+  for (int frame = 0; frame < 100; ++frame) see({{300, kBlueShirt, kGreenShirt}});
+  constexpr Colour kShaded{177, 30, 30};
+  const auto seen = [&] { return see({{500, kShaded, kDark}, {300, kBlueShirt, kGreenShirt}}); };
+  EXPECT_EQ(seen(), (Ids{3, 2}));
+  for (int frame = 0; frame < 10; ++frame) EXPECT_EQ(seen(), (Ids{3, 2}));
+  for (int frame = 0; frame < 10; ++frame) seen();
+  for (int frame = 0; frame < 30; ++frame) EXPECT_EQ(seen(), (Ids{1, 2}));
+  EXPECT_EQ(see({{500, kShaded, kDark}, {300, kBlueShirt, kGreenShirt}, {100, kGreenShirt, kRedShirt}}), (Ids{1, 2, 4}))
+      << "3 is not used again";
+}
+
+TEST_F(PersonTracker, SomebodyWhoIsStillThereIsNotAlsoTheOneWhoComes) {
+  for (int frame = 0; frame < 5; ++frame) see({{50, kRedShirt, kDark}});
+  for (int frame = 0; frame < 40; ++frame)
+    EXPECT_EQ(see({{50, kRedShirt, kDark}, {400, kRedShirt, kDark}}), (Ids{1, 2}));
+}
+
 TEST_F(PersonTracker, SomebodyElseAtTheSamePlaceIsNew) {
   see({{50, kRedShirt, kDark}});
   for (int frame = 0; frame < 50; ++frame) see({});

@@ -1,4 +1,4 @@
-// Colours of people by places on the body surface.
+// Colours of people by regions of the body.
 #include "densepose/tracking/surface_colours.h"
 
 #include <gtest/gtest.h>
@@ -38,12 +38,12 @@ TEST(SurfaceColours, AreTheSameInAllPixelFormats) {
 
 TEST(SurfaceColours, OldColoursFadeSlowly) {
   maq::SurfaceColours known, seen;
-  seen.places[4] = {{100, 128, 128}, 50};
-  for (int frame = 0; frame < 20; ++frame) known.add(seen);
-  EXPECT_EQ(known.places[4].samples, maq::SurfaceColours::kMaxSamples);
-  seen.places[4].colour[0] = 200;
+  seen.regions[4] = {{100, 128, 128}, 50};
+  for (int frame = 0; frame < 30; ++frame) known.add(seen);
+  EXPECT_EQ(known.regions[4].samples, maq::SurfaceColours::kMaxSamples);
+  seen.regions[4].colour[0] = 200;
   known.add(seen);
-  EXPECT_NEAR(known.places[4].colour[0], 100 + 100 * 50 / 450.0f, 0.01f);
+  EXPECT_NEAR(known.regions[4].colour[0], 100 + 100 * 50 / 1050.0f, 0.01f);
 }
 
 }  // namespace

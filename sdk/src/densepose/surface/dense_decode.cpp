@@ -254,61 +254,24 @@ class Painter {
     const size_t pixel = size_t(y) * size_t(planes_.width_px) + size_t(x);
     if (planes_.person[pixel] != 0) {
       ++taken_;
-      if (in_eighths(odds) > memory_.painted_odds[pixel]) memory_.won.push_back({x, y});
+      if (in_eighths(odds) > memory_.painted_odds[pixel]) win(x, y);
       return;
     }
     paint_pixel(pixel, odds, row, column, charts, part_between);
   }
 
-  // Takes everything back where other people leave less than that fraction of the person. Otherwise calls
-  // `paint_won(x, y)` for each pixel that another person is to lose.
-  template <class PaintWon>
-  DecodeCounts finish(float min_visible_fraction, PaintWon&& paint_won) {
-    if (float(counts_.body_pixels) < min_visible_fraction * float(counts_.body_pixels + taken_)) {
-      unpaint();
-      return {};
-    }
-    keep_visible(min_visible_fraction);
-    for (const DecodeMemory::Pixel& pixel : memory_.won) paint_won(pixel.x, pixel.y);
-    counts_.won_pixels = int64_t(memory_.won.size());
-    memory_.pixel_count[person_] = counts_.body_pixels;
-    return counts_;
-  }
+  // Takes everything back where other people leave less than that fraction of the person. Otherwise `memory.won` has
+  // the pixels that other people are to lose.
+  DecodeCounts finish(float min_visible_fraction);
 
-  // Paints a pixel of the person, whoever had it.
-  template <class PartBetween>
-  void repaint(int x, int y, const Tap& row, const Tap& column, ChartSampler* charts, PartBetween&& part_between) {
-    const size_t pixel = size_t(y) * size_t(planes_.width_px) + size_t(x);
-    paint_pixel(pixel, bilinear(memory_.odds.data(), size_, row, column), row, column, charts, part_between);
-  }
+  // Paints the pixels of `memory.won`; `to_cells` maps positions of the image to the cells.
+  DecodeCounts paint_won(const DenseLogits& logits, const AffineMap& to_cells);
 
  private:
-  // Nobody loses so many pixels that less than this fraction remains.
-  void keep_visible(float min_visible_fraction) {
-    memory_.lost_count.fill(0);
-    for (const DecodeMemory::Pixel& pixel : memory_.won) ++memory_.lost_count[owner_of(pixel)];
-    const auto is_kept = [&](const DecodeMemory::Pixel& pixel) {
-      const size_t owner = owner_of(pixel);
-      const int64_t had = memory_.pixel_count[owner];
-      return float(had - memory_.lost_count[owner]) < min_visible_fraction * float(had);
-    };
-    memory_.won.erase(std::remove_if(memory_.won.begin(), memory_.won.end(), is_kept), memory_.won.end());
-    for (const DecodeMemory::Pixel& pixel : memory_.won) --memory_.pixel_count[owner_of(pixel)];
-  }
-
+  [[gnu::noinline]] void win(int x, int y) { memory_.won.push_back({x, y}); }
+  void keep_visible(float min_visible_fraction);
   size_t owner_of(const DecodeMemory::Pixel& pixel) const {
     return planes_.person[size_t(pixel.y) * size_t(planes_.width_px) + size_t(pixel.x)];
-  }
-
-  void unpaint() {
-    for (int y = first_row_; y < end_row_; ++y) {
-      const size_t start = size_t(y) * size_t(planes_.width_px);
-      for (size_t pixel = start + size_t(first_column_); pixel < start + size_t(end_column_); ++pixel) {
-        if (planes_.person[pixel] != person_) continue;
-        for (std::vector<uint8_t>* plane : {&planes_.part, &planes_.u, &planes_.v, &planes_.person})
-          (*plane)[pixel] = 0;
-      }
-    }
   }
 
   static int8_t in_eighths(float odds) { return int8_t(std::floor(std::clamp(8 * odds, -127.0f, 127.0f) + 0.5f)); }
@@ -346,6 +309,52 @@ class Painter {
   DecodeCounts counts_;
   int64_t taken_ = 0;  // pixels of the person that belonged to other people
 };
+
+[[gnu::noinline]] DecodeCounts Painter::finish(float min_visible_fraction) {
+  if (float(counts_.body_pixels) >= min_visible_fraction * float(counts_.body_pixels + taken_)) {
+    keep_visible(min_visible_fraction);
+    memory_.pixel_count[person_] = counts_.body_pixels;
+    return counts_;
+  }
+  memory_.won.clear();
+  for (int y = first_row_; y < end_row_; ++y) {
+    const size_t start = size_t(y) * size_t(planes_.width_px);
+    for (size_t pixel = start + size_t(first_column_); pixel < start + size_t(end_column_); ++pixel) {
+      if (planes_.person[pixel] != person_) continue;
+      for (std::vector<uint8_t>* plane : {&planes_.part, &planes_.u, &planes_.v, &planes_.person}) (*plane)[pixel] = 0;
+    }
+  }
+  return {};
+}
+
+// Nobody loses so many pixels that less than this fraction remains.
+void Painter::keep_visible(float min_visible_fraction) {
+  memory_.lost_count.fill(0);
+  for (const DecodeMemory::Pixel& pixel : memory_.won) ++memory_.lost_count[owner_of(pixel)];
+  const auto is_kept = [&](const DecodeMemory::Pixel& pixel) {
+    const size_t owner = owner_of(pixel);
+    const int64_t had = memory_.pixel_count[owner];
+    return float(had - memory_.lost_count[owner]) < min_visible_fraction * float(had);
+  };
+  memory_.won.erase(std::remove_if(memory_.won.begin(), memory_.won.end(), is_kept), memory_.won.end());
+  for (const DecodeMemory::Pixel& pixel : memory_.won) --memory_.pixel_count[owner_of(pixel)];
+}
+
+// Not inlined: a few pixels are not worth code for each kind of processor.
+[[gnu::noinline]] DecodeCounts Painter::paint_won(const DenseLogits& logits, const AffineMap& to_cells) {
+  for (const DecodeMemory::Pixel& at : memory_.won) {
+    const Point cell = to_cells({at.x + 0.5, at.y + 0.5});
+    const Tap row = tap_at(float(cell.y), logits.size), column = tap_at(float(cell.x), logits.size);
+    std::optional<ChartSampler> charts;
+    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+    paint_pixel(size_t(at.y) * size_t(planes_.width_px) + size_t(at.x),
+                bilinear(memory_.odds.data(), size_, row, column), row, column, charts ? &*charts : nullptr,
+                [&] { return best_between(logits, row, column); });
+  }
+  counts_.won_pixels = int64_t(memory_.won.size());
+  memory_.pixel_count[person_] = counts_.body_pixels;
+  return counts_;
+}
 
 }  // namespace
 
@@ -429,12 +438,12 @@ MAQ_SIMD_CLONES DecodeCounts paint_person(const DenseLogits& logits, const Box& 
       });
     }
   }
-  return painter.finish(min_visible_fraction, [&](int x, int y) {
-    const Tap &row = memory.rows[size_t(y - rect.y)], &column = memory.columns[size_t(x - rect.x)];
-    std::optional<ChartSampler> charts;
-    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
-    painter.repaint(x, y, row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
-  });
+  const DecodeCounts counts = painter.finish(min_visible_fraction);
+  if (memory.won.empty()) return counts;
+  AffineMap to_cells;
+  to_cells.xx = double(logits.size) / rect.width, to_cells.shift_x = -rect.x * to_cells.xx;
+  to_cells.yy = double(logits.size) / rect.height, to_cells.shift_y = -rect.y * to_cells.yy;
+  return painter.paint_won(logits, to_cells);
 }
 
 MAQ_SIMD_CLONES DecodeCounts paint_rotated_person(const DenseLogits& logits, const AffineMap& to_cells, uint8_t person,
@@ -443,28 +452,19 @@ MAQ_SIMD_CLONES DecodeCounts paint_rotated_person(const DenseLogits& logits, con
   const float size = float(logits.size);
   Painter painter(logits, rotated_rect(to_cells.inverse(), logits.size, planes), person, mask_threshold, memory,
                   planes);
-  // Calls `paint` with the place of a pixel between the cells, if it lies there.
-  const auto between_cells = [&](int x, int y, const auto& paint) {
-    const Point cell = to_cells({x + 0.5, y + 0.5});
-    const float cell_x = float(cell.x), cell_y = float(cell.y);
-    if (!(cell_x >= 0 && cell_x <= size && cell_y >= 0 && cell_y <= size)) return;
-    const Tap row = tap_at(cell_y, logits.size), column = tap_at(cell_x, logits.size);
-    std::optional<ChartSampler> charts;
-    if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
-    paint(row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
-  };
   for (int y = painter.first_row(); y < painter.end_row(); ++y) {
     for (int x = painter.first_column(); x < painter.end_column(); ++x) {
-      between_cells(x, y, [&](const Tap& row, const Tap& column, ChartSampler* charts, const auto& part_between) {
-        painter.paint(x, y, row, column, charts, part_between);
-      });
+      const Point cell = to_cells({x + 0.5, y + 0.5});
+      const float cell_x = float(cell.x), cell_y = float(cell.y);
+      if (!(cell_x >= 0 && cell_x <= size && cell_y >= 0 && cell_y <= size)) continue;
+      const Tap row = tap_at(cell_y, logits.size), column = tap_at(cell_x, logits.size);
+      std::optional<ChartSampler> charts;
+      if (logits.charts != nullptr) charts.emplace(*logits.charts, row);
+      painter.paint(x, y, row, column, charts ? &*charts : nullptr, [&] { return best_between(logits, row, column); });
     }
   }
-  return painter.finish(min_visible_fraction, [&](int x, int y) {
-    between_cells(x, y, [&](const Tap& row, const Tap& column, ChartSampler* charts, const auto& part_between) {
-      painter.repaint(x, y, row, column, charts, part_between);
-    });
-  });
+  const DecodeCounts counts = painter.finish(min_visible_fraction);
+  return memory.won.empty() ? counts : painter.paint_won(logits, to_cells);
 }
 
 }  // namespace maq

@@ -8,6 +8,7 @@ namespace maq {
 namespace {
 
 constexpr float kStep = 1.0f / 255;  // of U and V in the planes
+constexpr float kRounding = 1e-6f;
 
 // Calls `visit` with x, y and the distance of each pixel of the person that shows the part.
 template <class Visit>
@@ -30,7 +31,7 @@ std::optional<SurfacePixel> find_surface_pixel(const DensePlanes& planes, uint8_
   if (std::isinf(nearest)) return std::nullopt;
   double x_sum = 0, y_sum = 0, count = 0;
   for_each_pixel(planes, person, part, u, v, [&](int x, int y, float distance) {
-    if (distance > nearest + kStep / 2) return;
+    if (distance > nearest + kRounding) return;
     x_sum += x + 0.5;
     y_sum += y + 0.5;
     ++count;

@@ -14,8 +14,7 @@ struct SurfacePixel {
 };
 
 // Returns the pixel of `person`, counted from 1, whose U and V are nearest to the wanted ones, among the pixels that
-// show `part`. If several pixels are equally near, up to half a step of U and V, it returns their middle. Returns
-// nothing if no pixel shows the part.
+// show `part`; the middle of several that are equally near. Returns nothing if no pixel shows the part.
 std::optional<SurfacePixel> find_surface_pixel(const DensePlanes& planes, uint8_t person, int part, float u, float v);
 
 }  // namespace maq

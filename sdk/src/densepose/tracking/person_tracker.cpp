@@ -25,7 +25,10 @@ constexpr float kMinIou = 0.1f, kNear = 0.5f;
 // which on it is somebody else.
 constexpr float kColourWeight = 1.5f, kOtherPerson = 0.5f;
 // A person who comes back: this share of the body tells, the colours differ by less, and from all others' by more.
-constexpr float kEnoughShared = 0.3f, kSameColours = 0.17f, kClearlyNearer = 0.04f;
+constexpr float kEnoughShared = 0.3f, kSameColours = 0.2f, kClearlyNearer = 0.05f;
+// The same after the person was seen for so long: the colours are surer then.
+constexpr float kSameColoursLater = 0.27f;
+constexpr double kNew_s = 0.7;
 // Boxes that overlap by more: the colours of one person may be on the other.
 constexpr float kMixed = 0.4f;
 
@@ -61,11 +64,13 @@ void PersonTracker::begin_stream(int64_t last_id) {
 const std::vector<int64_t>& PersonTracker::update(const ImageView& image, const DensePlanes& planes,
                                                   const std::vector<Box>& boxes, std::optional<int64_t> time_ns) {
   move_time(image, time_ns);
+  ++frame_;
   read_colours(image, planes, boxes.size(), colours_);
   track_of_.assign(boxes.size(), -1);
   is_taken_.assign(tracks_.size(), 0);
   recognise_by_place(boxes);
   recognise_by_colours(boxes);
+  recognise_new(boxes);
   ids_.clear();
   for (size_t i = 0; i < boxes.size(); ++i) {
     if (track_of_[i] >= 0) {
@@ -128,44 +133,63 @@ bool PersonTracker::is_reachable(const Track& track, const Box& box) const {
   return distance < (kNear + kFastest * float(since_s)) * std::max(size_of(track.box), size_of(box));
 }
 
-void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
-  costs_.assign(tracks_.size() * boxes.size(), 1);
+template <class IsCandidate>
+int PersonTracker::nearest_away(const SurfaceColours& colours, float max_distance, const IsCandidate& is_candidate,
+                                float* distance) const {
+  float nearest = 1, second = 1;
+  int found = -1;
   for (size_t k = 0; k < tracks_.size(); ++k) {
-    if (is_taken_[k] != 0) continue;
-    for (size_t i = 0; i < boxes.size(); ++i) {
-      if (track_of_[i] >= 0 || !is_reachable(tracks_[k], boxes[i])) continue;
-      const ColourDifference look = difference(tracks_[k].colours, colours_[i]);
-      if (look.shared > kEnoughShared) costs_[k * boxes.size() + i] = look.distance;
+    if (is_taken_[k] != 0 || !is_candidate(tracks_[k])) continue;
+    const ColourDifference look = difference(tracks_[k].colours, colours);
+    if (!(look.shared > kEnoughShared)) continue;
+    if (look.distance < nearest) {
+      second = nearest;
+      nearest = look.distance;
+      found = int(k);
+    } else {
+      second = std::min(second, look.distance);
     }
   }
+  *distance = nearest;
+  return nearest < max_distance && nearest + kClearlyNearer < second ? found : -1;
+}
+
+void PersonTracker::recognise_by_colours(const std::vector<Box>& boxes) {
   // The person and the track that are nearest to each other, again and again.
   while (true) {
-    float best = kSameColours;
+    float best = 1;
     int person = -1, track = -1;
     for (size_t i = 0; i < boxes.size(); ++i) {
       if (track_of_[i] >= 0) continue;
-      float nearest = 1, second = 1;
-      int nearest_track = -1;
-      for (size_t k = 0; k < tracks_.size(); ++k) {
-        if (is_taken_[k] != 0) continue;
-        const float distance = costs_[k * boxes.size() + i];
-        if (distance < nearest) {
-          second = nearest;
-          nearest = distance;
-          nearest_track = int(k);
-        } else {
-          second = std::min(second, distance);
-        }
-      }
-      if (nearest < best && nearest + kClearlyNearer < second) {
-        best = nearest;
-        person = int(i);
-        track = nearest_track;
-      }
+      float distance = 1;
+      const auto is_reached = [&](const Track& away) { return is_reachable(away, boxes[i]); };
+      const int found = nearest_away(colours_[i], kSameColours, is_reached, &distance);
+      if (found < 0 || distance >= best) continue;
+      best = distance;
+      person = int(i);
+      track = found;
     }
     if (person < 0) return;
     track_of_[size_t(person)] = track;
     is_taken_[size_t(track)] = 1;
+    tracks_[size_t(track)].is_new = false;
+  }
+}
+
+void PersonTracker::recognise_new(const std::vector<Box>& boxes) {
+  for (size_t i = 0; i < boxes.size(); ++i) {
+    if (track_of_[i] < 0) continue;
+    Track& track = tracks_[size_t(track_of_[i])];
+    if (!track.is_new || double(between(track.begun_ns, now_ns_)) < kNew_s * double(kSecond_ns)) continue;
+    track.is_new = false;
+    const auto left_before = [&](const Track& away) { return away.seen_frame < track.begun_frame; };
+    float distance = 1;
+    const int found = nearest_away(track.colours, kSameColoursLater, left_before, &distance);
+    if (found < 0) continue;
+    is_taken_[size_t(found)] = 1;
+    track.id = tracks_[size_t(found)].id;  // and the new id is nobody's any more
+    track.colours.add(tracks_[size_t(found)].colours);
+    tracks_[size_t(found)].id = 0;
   }
 }
 
@@ -181,6 +205,7 @@ void PersonTracker::take_over(Track& track, size_t person, const std::vector<Box
   }
   track.box = box;
   track.seen_ns = now_ns_;
+  track.seen_frame = frame_;
   track.has_place = true;
   const auto is_mixed = [&](const Box& other) { return &other != &box && overlap(other, box) > kMixed; };
   if (std::none_of(boxes.begin(), boxes.end(), is_mixed)) track.colours.add(colours_[person]);
@@ -190,13 +215,16 @@ void PersonTracker::start(size_t person, const Box& box) {
   Track track;
   track.id = ++last_id_;
   track.box = box;
-  track.seen_ns = now_ns_;
+  track.seen_ns = track.begun_ns = now_ns_;
+  track.seen_frame = track.begun_frame = frame_;
   track.colours = colours_[person];
   track_of_[person] = int(tracks_.size());
   tracks_.push_back(track);
 }
 
 void PersonTracker::forget_oldest() {
+  const auto is_gone = [](const Track& track) { return track.id == 0; };
+  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_gone), tracks_.end());
   while (tracks_.size() > max_tracks_) {
     // Tracks of an earlier time come first, whatever their clock said; then those seen longest ago.
     const auto is_older = [](const Track& a, const Track& b) {

@@ -14,7 +14,8 @@
 namespace maq {
 
 // A person is recognised by place and motion while seen and for a second after, with the colours of the body surface
-// beside them; later by the colours alone. No two people of a stream get one id at the same time.
+// beside them; later by the colours alone: in the first frame, or when the person was seen for some time. So a person
+// who comes back may have another id for that time. No two people of a stream get one id at the same time.
 class PersonTracker {
  public:
   // `max_people`: of a frame.
@@ -38,6 +39,9 @@ class PersonTracker {
     Box box;
     float velocity_x = 0, velocity_y = 0;  // of the box's centre, pixels a second
     int64_t seen_ns = 0;
+    int64_t begun_ns = 0;
+    int64_t seen_frame = 0, begun_frame = 0;
+    bool is_new = true;     // was not compared yet with people who left
     bool has_place = true;  // of this run of frames, so that place and motion count
     SurfaceColours colours;
   };
@@ -47,6 +51,13 @@ class PersonTracker {
   void move_time(const ImageView& image, std::optional<int64_t> time_ns);
   void recognise_by_place(const std::vector<Box>& boxes);
   void recognise_by_colours(const std::vector<Box>& boxes);
+  // For people who came some time ago: whether they were here before.
+  void recognise_new(const std::vector<Box>& boxes);
+  // Returns the track of somebody who left and looks like `colours`, clearly more than all others do; -1 for none.
+  // `is_candidate(track)`: whether it may be the person.
+  template <class IsCandidate>
+  int nearest_away(const SurfaceColours& colours, float max_distance, const IsCandidate& is_candidate,
+                   float* distance) const;
   // Whether a person could have come there from the track's last place.
   bool is_reachable(const Track& track, const Box& box) const;
   void take_over(Track& track, size_t person, const std::vector<Box>& boxes);
@@ -56,6 +67,7 @@ class PersonTracker {
   size_t max_tracks_;
   int64_t last_id_ = 0;
   int64_t now_ns_ = 0;
+  int64_t frame_ = 0;
   bool is_begun_ = false;
   int width_px_ = 0, height_px_ = 0;
   std::vector<Track> tracks_;

@@ -9,61 +9,26 @@ namespace {
 // Pixels that are read of each frame, about.
 constexpr double kReadPixels = 20000;
 
-// Parts of one region wear one colour more often than not, and show it from the front and from behind.
-constexpr int kRegions = 8;
-enum Region { kTorso, kHands, kFeet, kUpperLegs, kLowerLegs, kUpperArms, kLowerArms, kHead };
-constexpr std::array<Region, SurfaceColours::kParts> kRegionOfPart = {
+constexpr size_t kParts = 24;
+enum RegionName { kTorso, kHands, kFeet, kUpperLegs, kLowerLegs, kUpperArms, kLowerArms, kHead };
+constexpr std::array<RegionName, kParts> kRegionOfPart = {
     kTorso,     kTorso,     kHands,     kHands,     kFeet,      kFeet,      kUpperLegs, kUpperLegs,
     kUpperLegs, kUpperLegs, kLowerLegs, kLowerLegs, kLowerLegs, kLowerLegs, kUpperArms, kUpperArms,
     kUpperArms, kUpperArms, kLowerArms, kLowerArms, kLowerArms, kLowerArms, kHead,      kHead};
 // How much a region tells of who somebody is: clothes more than skin.
-constexpr std::array<float, kRegions> kRegionWeight = {3, 0.3f, 0.7f, 2, 1.5f, 1.5f, 1, 1};
-// Pixels that a region or place must show in both to count in full.
-constexpr float kEnoughOfRegion = 12, kEnoughOfPlace = 4;
+constexpr std::array<float, size_t(SurfaceColours::kRegions)> kWeight = {3, 0.3f, 0.7f, 3, 2, 1.5f, 0.5f, 1};
+// Pixels that a region must show in both to count in full.
+constexpr float kEnough = 12;
 // Light changes Y most. Differences in colour that count as 1.
-constexpr float kLumaScale = 110, kChromaScale = 40;
+constexpr float kLumaScale = 110, kChromaScale = 25;
 
-using Place = SurfaceColours::Place;
+using Region = SurfaceColours::Region;
 
-float colour_distance(const Place& a, const Place& b) {
+float colour_distance(const Region& a, const Region& b) {
   const float luma = (a.colour[0] - b.colour[0]) / kLumaScale;
   const float blue = (a.colour[1] - b.colour[1]) / kChromaScale;
   const float red = (a.colour[2] - b.colour[2]) / kChromaScale;
   return std::min(1.0f, std::sqrt(luma * luma + blue * blue + red * red));
-}
-
-void add_to(Place& place, const Place& more) {
-  const float samples = place.samples + more.samples;
-  if (!(samples > 0)) return;
-  const float share = more.samples / samples;
-  for (size_t c = 0; c < 3; ++c) place.colour[c] += (more.colour[c] - place.colour[c]) * share;
-  place.samples = samples;
-}
-
-std::array<Place, kRegions> regions_of(const SurfaceColours& colours) {
-  std::array<Place, kRegions> regions{};
-  for (size_t i = 0; i < colours.places.size(); ++i) {
-    add_to(regions[size_t(kRegionOfPart[i / SurfaceColours::kPlacesOfPart])], colours.places[i]);
-  }
-  return regions;
-}
-
-// A weighted mean.
-class Mean {
- public:
-  void add(float value, float weight) {
-    sum_ += value * weight;
-    weight_ += weight;
-  }
-  float weight() const { return weight_; }
-  float value() const { return weight_ > 0 ? sum_ / weight_ : 0; }
-
- private:
-  float sum_ = 0, weight_ = 0;
-};
-
-float common(const Place& a, const Place& b, float enough) {
-  return std::min(1.0f, std::min(a.samples, b.samples) / enough);
 }
 
 std::array<float, 3> of_rgb(float red, float green, float blue) {
@@ -104,29 +69,26 @@ std::array<float, 3> colour_at(const ImageView& image, int x, int y) {
 }  // namespace
 
 void SurfaceColours::add(const SurfaceColours& seen) {
-  for (size_t i = 0; i < places.size(); ++i) {
-    add_to(places[i], seen.places[i]);
-    places[i].samples = std::min(places[i].samples, kMaxSamples);
+  for (size_t r = 0; r < regions.size(); ++r) {
+    Region& region = regions[r];
+    const float samples = region.samples + seen.regions[r].samples;
+    if (!(samples > 0)) continue;
+    const float share = seen.regions[r].samples / samples;
+    for (size_t c = 0; c < 3; ++c) region.colour[c] += (seen.regions[r].colour[c] - region.colour[c]) * share;
+    region.samples = std::min(samples, kMaxSamples);
   }
 }
 
 ColourDifference difference(const SurfaceColours& a, const SurfaceColours& b) {
-  const std::array<Place, kRegions> of_a = regions_of(a), of_b = regions_of(b);
-  Mean coarse, fine;
-  float all = 0;
-  for (size_t r = 0; r < kRegions; ++r) {
-    all += kRegionWeight[r];
-    const float shared = common(of_a[r], of_b[r], kEnoughOfRegion);
-    coarse.add(colour_distance(of_a[r], of_b[r]), kRegionWeight[r] * shared);
+  float sum = 0, weight = 0, all = 0;
+  for (size_t r = 0; r < kWeight.size(); ++r) {
+    const float samples = std::min(a.regions[r].samples, b.regions[r].samples);
+    const float shared = kWeight[r] * std::min(1.0f, samples / kEnough);
+    sum += shared * colour_distance(a.regions[r], b.regions[r]);
+    weight += shared;
+    all += kWeight[r];
   }
-  for (size_t i = 0; i < a.places.size(); ++i) {
-    const float shared = common(a.places[i], b.places[i], kEnoughOfPlace);
-    const Region region = kRegionOfPart[i / SurfaceColours::kPlacesOfPart];
-    fine.add(colour_distance(a.places[i], b.places[i]), kRegionWeight[size_t(region)] * shared);
-  }
-  // Places tell more (a print on the chest) but are seldom the same ones: they count by half if they are there.
-  const float distance = fine.weight() > 0 ? (coarse.value() + fine.value()) / 2 : coarse.value();
-  return {distance, coarse.weight() / all};
+  return {weight > 0 ? sum / weight : 0, weight / all};
 }
 
 void read_colours(const ImageView& image, const DensePlanes& planes, size_t people,
@@ -140,18 +102,16 @@ void read_colours(const ImageView& image, const DensePlanes& planes, size_t peop
     for (int x = step / 2; x < planes.width_px; x += step) {
       const size_t pixel = row + size_t(x);
       const size_t person = planes.person[pixel], part = planes.part[pixel];
-      if (person == 0 || person > people || part == 0 || part > size_t(SurfaceColours::kParts)) continue;
-      const size_t place = size_t(SurfaceColours::kPlacesOfPart) * (part - 1) + size_t(planes.u[pixel] / 128) * 2 +
-                           size_t(planes.v[pixel] / 128);
-      Place& sum = colours[person - 1].places[place];
+      if (person == 0 || person > people || part == 0 || part > kParts) continue;
+      Region& sum = colours[person - 1].regions[size_t(kRegionOfPart[part - 1])];
       const std::array<float, 3> colour = colour_at(image, x, y);
       for (size_t c = 0; c < 3; ++c) sum.colour[c] += colour[c];
       ++sum.samples;
     }
   }
   for (SurfaceColours& one : colours) {
-    for (Place& place : one.places) {
-      for (float& mean : place.colour) mean /= std::max(1.0f, place.samples);
+    for (Region& region : one.regions) {
+      for (float& mean : region.colour) mean /= std::max(1.0f, region.samples);
     }
   }
 }

@@ -1,4 +1,4 @@
-// Mean colours of places on the body surface, as far as they were seen: how a person looks.
+// Mean colours of regions of the body, as far as they were seen: how a person looks.
 #pragma once
 
 #include <array>
@@ -11,21 +11,23 @@ namespace maq {
 
 // Colours are Y, Cb and Cr (BT.601), 0 to 255.
 struct SurfaceColours {
-  struct Place {
+  struct Region {
     std::array<float, 3> colour{};  // mean
     float samples = 0;              // how many pixels it is the mean of, at most kMaxSamples
   };
-  static constexpr int kParts = 24, kPlacesOfPart = 4;  // halves in U by halves in V
+  // Torso, hands, feet, upper and lower legs, upper and lower arms, head: of both sides, from the front and from
+  // behind.
+  static constexpr int kRegions = 8;
   // Older pixels count less once this many were seen.
-  static constexpr float kMaxSamples = 400;
+  static constexpr float kMaxSamples = 1000;
 
-  std::array<Place, size_t(kParts* kPlacesOfPart)> places;
+  std::array<Region, size_t(kRegions)> regions;
 
   // Adds what another frame shows of the same person.
   void add(const SurfaceColours& seen);
 };
 
-// 0: the same colours on all places that both show; 1: as different as clothes can be. `shared`: how much of the body
+// 0: the same colours on all regions that both show; 1: as different as clothes can be. `shared`: how much of the body
 // both show, 0 to 1; at 0 nothing can be said.
 struct ColourDifference {
   float distance = 0;

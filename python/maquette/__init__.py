@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from maquette.bodies import BODY_ANGLES, Body, BodyClip, BodyMesh, BodyPerson, BodyResult
+from maquette.bodies import BODY_ANGLES, Body, BodyClip, BodyMesh, BodyPerson, BodyResult, BodySize, BodySizes
 from maquette.densepose import (
     COCO_KEYPOINTS,
     KEYPOINTS,
@@ -61,7 +61,8 @@ from maquette.sources import (
 
 __all__ = [
     "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS",
-    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "Box", "Camera", "CameraMode", "Capture",
+    "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult", "BodySize", "BodySizes", "Box", "Camera",
+    "CameraMode", "Capture",
     "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DensePose", "DensePoseModel", "DensePoseResult",
     "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark",
     "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget",

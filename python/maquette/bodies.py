@@ -34,6 +34,28 @@ class BodyMesh:
     shape_count: int
 
 
+@dataclass(frozen=True)
+class BodySize:
+    """A size in metres; 90 % of people have a true size between low_m and high_m (docs/research/body.md)."""
+
+    value_m: float
+    low_m: float
+    high_m: float
+
+
+@dataclass(frozen=True)
+class BodySizes:
+    """Sizes of a body without clothes. chest, waist and hip are girths. is_height_known: False where no height was
+    given; the scale is that of the average person then, and all intervals are wide."""
+
+    is_height_known: bool
+    height: BodySize
+    chest: BodySize
+    waist: BodySize
+    hip: BodySize
+    inseam: BodySize
+
+
 @dataclass(frozen=True, eq=False)
 class BodyPerson:
     """The body of one person. fit: "fitted", "too_few_pixels" or "unreliable"; the rest is None, or empty, unless it is
@@ -43,7 +65,8 @@ class BodyPerson:
     joint_rotations: float32 [J, 3], rotation vectors relative to the parent, radians. orientation: float32 [3, 3], body
     axes (x left, y back, z up) to camera axes. shape: float32 [S]. angles_deg: by the names of `BODY_ANGLES`.
     pelvis_m: float32 [3], its place in the camera; None without intrinsics. pelvis_px, scale_px_per_m: where the image
-    shows it. seen_joints: bool [J], False for joints that follow the prior. inlier_fraction, error_px: quality.
+    shows it. sizes: height, girths and inseam with intervals. seen_joints: bool [J], False for joints that follow the
+    prior. inlier_fraction, error_px: quality.
     """
 
     id: int
@@ -62,6 +85,7 @@ class BodyPerson:
     joints_m: np.ndarray | None = None
     keypoints_m: np.ndarray | None = None
     vertices_m: np.ndarray | None = None
+    sizes: BodySizes | None = None
 
 
 class BodyResult:
@@ -102,13 +126,21 @@ class Body(NativeObject):
             mesh.shape_count,
         )
 
-    def run(self, people: DensePoseResult, intrinsics: Intrinsics | None = None, timestamp_ns: int = 0) -> BodyResult:
+    def run(
+        self,
+        people: DensePoseResult,
+        intrinsics: Intrinsics | None = None,
+        timestamp_ns: int = 0,
+        heights_m: Sequence[float] | None = None,
+    ) -> BodyResult:
         """people: of `DensePose.run`. intrinsics: of the camera; None: unknown. timestamp_ns: of the frame; with it and
-        the people's ids, each fit starts from the body in the frame before. Raises MaquetteError."""
+        the people's ids, each fit starts from the body in the frame before. heights_m: true height of each person, 0
+        for unknown; it sets the scale of the mesh and of `sizes`. Raises MaquetteError, ValueError for another number
+        of heights."""
         ids = [person.id for person in people.people]
         keypoints = [person.keypoints for person in people.people]
         known = None if not keypoints or any(k is None for k in keypoints) else np.stack(keypoints)  # type: ignore[arg-type]
-        return self.run_planes(people.iuv, people.person, ids, known, intrinsics, timestamp_ns)
+        return self.run_planes(people.iuv, people.person, ids, known, intrinsics, timestamp_ns, heights_m)
 
     def run_planes(
         self,
@@ -118,6 +150,7 @@ class Body(NativeObject):
         keypoints: np.ndarray | None = None,
         intrinsics: Intrinsics | None = None,
         timestamp_ns: int = 0,
+        heights_m: Sequence[float] | None = None,
     ) -> BodyResult:
         """For dense pose images from elsewhere. iuv: uint8 [H, W, 3], part, U * 255, V * 255. person: uint8 [H, W],
         index in `ids` plus 1. ids: one for each person, 0 for unknown. keypoints: float32 [P, 33, 3] or None. Raises
@@ -129,6 +162,8 @@ class Body(NativeObject):
             raise ValueError(
                 f"keypoints have the shape {keypoints.shape}, but must be {(len(ids), len(KEYPOINTS), 3)}."
             )
+        if heights_m is not None and len(heights_m) != len(ids):
+            raise ValueError(f"heights_m has {len(heights_m)} numbers, but there are {len(ids)} people.")
         given = n.ffi.new("maq_body_input *")
         n.call("maq_body_input_init", given, n.ffi.sizeof("maq_body_input"))
         given.height_px, given.width_px = person.shape
@@ -145,19 +180,23 @@ class Body(NativeObject):
             kept.append(n.ffi.new("maq_intrinsics *"))
             intrinsics.write_to(kept[-1])
             given.intrinsics = kept[-1]
+        if heights_m is not None:
+            kept.append(n.ffi.new("float[]", [float(height) for height in heights_m] or [0.0]))
+            given.heights_m = kept[-1]
         given.timestamp_ns = timestamp_ns
         self._lender.make_room()
         result = n.create("maq_body_result", self.handle, given, function="maq_body_run",
                           release="maq_body_result_release")  # fmt: skip
         count = n.lib.maq_body_result_get_person_count(result)
         found = n.indexed("maq_body_result_get_person", result, "maq_body_person", count)
-        return BodyResult([self._person(person) for person in found], self._lender.lend(result))
+        people = [self._person(person, result, index) for index, person in enumerate(found)]
+        return BodyResult(people, self._lender.lend(result))
 
     def reset(self) -> None:
         """The next frame starts a new stream. Raises MaquetteError."""
         native().call("maq_body_reset", self.handle)
 
-    def _person(self, person: Any) -> BodyPerson:
+    def _person(self, person: Any, result: Any, index: int) -> BodyPerson:
         fit = native().name_of("maq_body_fit", person.fit)
         if fit != "fitted":
             return BodyPerson(person.id, fit)
@@ -172,7 +211,7 @@ class Body(NativeObject):
             _array(person.shape, (self.mesh.shape_count,), np.float32),
             _array(person.joint_rotations, (joints, 3), np.float32), _array(person.joints_m, (joints, 3), np.float32),
             _array(person.keypoints_m, (len(KEYPOINTS), 3), np.float32),
-            _array(person.vertices_m, (self.mesh.vertex_count, 3), np.float32),
+            _array(person.vertices_m, (self.mesh.vertex_count, 3), np.float32), _sizes(result, index),
         )  # fmt: skip
 
 
@@ -203,6 +242,13 @@ class BodyClip(NativeObject):
     def save_person(self, index: int, path: str | os.PathLike[str]) -> None:
         """Writes one person to a .glb or .bvh file; 0 has the most frames. Raises MaquetteError."""
         native().call("maq_body_clip_save_person", self.handle, index, path_to_write(path))
+
+
+def _sizes(result: Any, index: int) -> BodySizes:
+    sizes = native().sized("maq_body_sizes")
+    native().call("maq_body_result_get_sizes", result, index, sizes)
+    named = [getattr(sizes, name) for name in ("height", "chest", "waist", "hip", "inseam")]
+    return BodySizes(bool(sizes.is_height_known), *(BodySize(size.value_m, size.low_m, size.high_m) for size in named))
 
 
 def _array(pointer: Any, shape: tuple[int, ...], kind: type) -> np.ndarray:

@@ -45,6 +45,9 @@ typedef struct maq_body_input {
   const maq_intrinsics* intrinsics; /* camera of the image; distortion is ignored. NULL (default): unknown, and people
                                        are seen in weak perspective: all of a person at one depth */
   int64_t timestamp_ns;             /* of the frame */
+  const float* heights_m; /* person_count heights of people in metres, 1.3 to 2.3; 0: unknown. NULL (default): all
+                             unknown. One camera does not show how large a person is: mesh, pelvis_m and sizes are those
+                             of a person of average height unless the height is given */
 } maq_body_input;
 
 /* The outcome for one person. Values never change meaning; new ones are added at the end. */
@@ -107,6 +110,26 @@ typedef struct maq_body_person {
   const float* vertices_m;      /* [vertex_count][3] */
 } maq_body_person;
 
+/* A size, and the interval that contains the true size of 90 % of people (docs/research/body.md). */
+typedef struct maq_body_size {
+  float value_m;
+  float low_m;
+  float high_m;
+} maq_body_size;
+
+/* Sizes of the body without clothes, standing upright. Girths are measured around the convex hull of the torso, without
+ * the arms. */
+typedef struct maq_body_sizes {
+  uint32_t struct_size;
+  int32_t is_height_known; /* 1: heights_m had the height. 0: all sizes have the wide intervals of an unknown scale;
+                              with another height h, multiply them by h / height.value_m */
+  maq_body_size height;    /* from the soles to the top of the head; exact where it is known */
+  maq_body_size chest;     /* girth between armpits and nipples */
+  maq_body_size waist;     /* girth of the narrowest part */
+  maq_body_size hip;       /* girth of the widest part of the buttocks */
+  maq_body_size inseam;    /* from the crotch to the soles */
+} maq_body_sizes;
+
 /* Returns the name of an angle ("left_elbow"), or "unknown" for numbers outside 0 to 7. The text is static.
  * Any thread. Does not fail or block. */
 MAQ_API const char* maq_body_get_angle_name(int32_t angle);
@@ -154,6 +177,11 @@ MAQ_API uint32_t maq_body_result_get_person_count(const maq_body_result* result)
 /* Gets the person at `index`, in the order of the input. The caller sets person->struct_size.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (index out of range). Does not block. */
 MAQ_API maq_status maq_body_result_get_person(const maq_body_result* result, uint32_t index, maq_body_person* person);
+
+/* Gets the sizes of the person at `index`. The caller sets sizes->struct_size. Intervals are wider where the image
+ * shows less of a person, and for people of the average population of the body's bundle. Any thread. Errors:
+ * MAQ_ERROR_INVALID_ARGUMENT (index out of range), MAQ_ERROR_NOT_FOUND (the person was not fitted). Does not block. */
+MAQ_API maq_status maq_body_result_get_sizes(const maq_body_result* result, uint32_t index, maq_body_sizes* sizes);
 
 /* Creates an empty clip of bodies. The caller owns `*clip`: free it with maq_body_clip_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */

@@ -33,6 +33,14 @@ class BodyResult {
 
   maq_body_result* get() const { return owner_.get(); }
 
+  // Gets the sizes of the person at `index`. Throws maquette::Error for a person who was not fitted.
+  maq_body_sizes sizes(uint32_t index) const {
+    maq_body_sizes sizes{};
+    sizes.struct_size = sizeof sizes;
+    check(maq_body_result_get_sizes(get(), index, &sizes));
+    return sizes;
+  }
+
   // In the order of the input. The pointers are valid as long as this object.
   std::vector<maq_body_person> people() const {
     std::vector<maq_body_person> all(maq_body_result_get_person_count(get()));
@@ -65,8 +73,8 @@ class Body {
 
 #if MAQ_HAS_DENSEPOSE
   // Fits the people of a dense pose result; with its keypoints, if it has some. `frame`: of the result; its time, and
-  // its intrinsics if it has some.
-  BodyResult run(const DensePoseResult& result, const maq_frame_desc& frame) {
+  // its intrinsics if it has some. heights_m: of each person, 0 for unknown; empty: all unknown.
+  BodyResult run(const DensePoseResult& result, const maq_frame_desc& frame, const std::vector<float>& heights_m = {}) {
     maq_body_input input = default_body_input();
     input.width_px = result.width_px();
     input.height_px = result.height_px();
@@ -89,6 +97,9 @@ class Body {
       has_keypoints = maq_densepose_result_get_keypoints(result.get(), i, keypoints.data() + 99 * i) == MAQ_OK;
     }
     if (has_keypoints) input.keypoints = keypoints.data();
+    std::vector<float> heights = heights_m;
+    heights.resize(ids.size());
+    input.heights_m = heights.data();
     if (frame.intrinsics.width_px > 0) input.intrinsics = &frame.intrinsics;
     input.timestamp_ns = frame.timestamp_ns;
     return run(input);

@@ -104,6 +104,57 @@ TEST_F(ApiBody, WithIntrinsicsThePelvisHasAPlaceInMetres) {
   EXPECT_NEAR(people[0].scale_px_per_m, 700 / people[0].pelvis_m[2], 1);
 }
 
+TEST_F(ApiBody, SizesHaveIntervalsAndAHeightSetsTheScale) {
+  maq_body_input given = input();
+  const maq_intrinsics camera = {given.width_px, given.height_px, 700, 700, 255.5, 255.5, {}};
+  given.intrinsics = &camera;
+  const maquette::BodyResult unknown = body.run(given);
+  const maq_body_sizes wide = unknown.sizes(0);
+  EXPECT_EQ(wide.is_height_known, 0);
+  for (const maq_body_size& size : {wide.height, wide.chest, wide.waist, wide.hip, wide.inseam}) {
+    EXPECT_GT(size.low_m, 0.3f);
+    EXPECT_LT(size.low_m, size.value_m);
+    EXPECT_LT(size.value_m, size.high_m);
+    EXPECT_LT(size.high_m, 2.8f);
+  }
+  const float height_m = 1.5f;
+  given.heights_m = &height_m;
+  const maquette::BodyResult known = body.run(given);
+  const maq_body_sizes sizes = known.sizes(0);
+  EXPECT_EQ(sizes.is_height_known, 1);
+  EXPECT_FLOAT_EQ(sizes.height.value_m, 1.5f);
+  EXPECT_EQ(sizes.height.low_m, sizes.height.high_m);
+  EXPECT_LT(sizes.inseam.high_m - sizes.inseam.low_m, wide.inseam.high_m - wide.inseam.low_m);
+  EXPECT_NEAR(known.people()[0].pelvis_m[2] / unknown.people()[0].pelvis_m[2], 1.5f / wide.height.value_m, 0.06f);
+  // The mesh at rest is 1.5 m tall, so its trunk in this pose is shorter than that of the taller body.
+  EXPECT_GT(known.people()[0].keypoints_m[1], unknown.people()[0].keypoints_m[1]);  // the nose, y down
+}
+
+TEST_F(ApiBody, SizesOfPeopleWhoWereNotFittedAndHeightsOutOfRangeAreRefused) {
+  maq_body_input given = input();
+  given.person_count = 3;
+  const maquette::BodyResult result = body.run(given);
+  maq_body_sizes sizes{};
+  sizes.struct_size = sizeof sizes;
+  EXPECT_EQ(maq_body_result_get_sizes(result.get(), 2, &sizes), MAQ_ERROR_NOT_FOUND);
+  EXPECT_NE(std::strstr(maq_last_error(result.get()), "was not fitted"), nullptr);
+  EXPECT_EQ(maq_body_result_get_sizes(result.get(), 3, &sizes), MAQ_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(maq_body_result_get_sizes(result.get(), 0, nullptr), MAQ_ERROR_INVALID_ARGUMENT);
+  sizes.struct_size = 4;
+  EXPECT_EQ(maq_body_result_get_sizes(result.get(), 0, &sizes), MAQ_ERROR_INVALID_ARGUMENT);
+  for (const float wrong : {1.29f, 2.31f, -1.7f, 178.0f, std::numeric_limits<float>::quiet_NaN()}) {
+    const float heights_m[] = {0, 1.7f, wrong};
+    given.heights_m = heights_m;
+    expect_refused(given, "input.heights_m[2] is ");
+  }
+  for (const float right : {1.3f, 2.3f}) {
+    const float heights_m[] = {right, 0, 0};
+    given.heights_m = heights_m;
+    const maquette::BodyResult bounds = body.run(given);
+    EXPECT_FLOAT_EQ(bounds.sizes(0).height.value_m, right);
+  }
+}
+
 TEST_F(ApiBody, PeopleWithoutPixelsAreAStatusWithoutPointers) {
   maq_body_input given = input();
   given.person_count = 3;

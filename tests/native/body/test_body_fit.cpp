@@ -99,7 +99,7 @@ TEST(BodyFit, TheGradientIsThatOfTheCostWithAllItsTerms) {
   problem.seen = &seen;
   problem.camera = kPinhole;
   problem.error_px = 6;
-  problem.shape.mean[1] = 0.4, problem.shape.precision = 3;
+  problem.shape.mean[1] = 0.4, problem.shape.precision = 3, problem.shape.height_m = 1.7;
   problem.before = &before, problem.before_precision = 40;
   FitEquations equations(model());
   const double cost = equations.linearize(problem, pose);

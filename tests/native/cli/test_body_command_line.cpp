@@ -38,6 +38,24 @@ TEST_F(BodyCommandLine, APhotoIsOneStaticBodyWithItsAngles) {
   EXPECT_EQ(read_text(folder_.file("photo.glb")).find("\"animations\""), std::string::npos);
 }
 
+TEST_F(BodyCommandLine, SizesAreATableWithIntervalsThatAHeightNarrows) {
+  const Outcome unknown = run("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.glb");
+  ASSERT_EQ(unknown.exit_code, 0) << unknown.err;
+  EXPECT_NE(unknown.out.find("size, cm  height"), std::string::npos) << unknown.out;
+  EXPECT_NE(unknown.out.find("--height narrows"), std::string::npos) << unknown.out;
+  EXPECT_NE(unknown.out.find(" to "), std::string::npos) << unknown.out;
+  const Outcome known = run("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.glb --height 1.65");
+  ASSERT_EQ(known.exit_code, 0) << known.err;
+  EXPECT_NE(known.out.find("  165  "), std::string::npos) << known.out;
+  EXPECT_EQ(known.out.find("--height narrows"), std::string::npos) << known.out;
+  const Outcome json = run("'" MAQ_TEST_MEDIA "/photo.jpg' --json --height 1.65");
+  ASSERT_EQ(json.exit_code, 0) << json.err;
+  const auto sizes = nlohmann::json::parse(json.out)["people"][0]["sizes_m"];
+  EXPECT_EQ(sizes["is_height_known"], true);
+  EXPECT_EQ(sizes["height"]["value"], 1.65);
+  EXPECT_LT(sizes["waist"]["low"].get<double>(), sizes["waist"]["value"].get<double>());
+}
+
 TEST_F(BodyCommandLine, JsonHasALineForEachFrameWithKeypointsAndAngles) {
   const Outcome result = run("'stub:people?count=1&seed=3' --max-frames 3 --json --focal-length 600");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -66,6 +84,7 @@ TEST_F(BodyCommandLine, WhatCannotBeDoneIsASentence) {
   EXPECT_FALSE(exists("a.glb"));
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.obj", "must end with .glb");
   expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.glb --body-bundle none", "none");
+  expect_error("'" MAQ_TEST_MEDIA "/photo.jpg' --out a.glb --height 178", "1.3");
 }
 
 }  // namespace

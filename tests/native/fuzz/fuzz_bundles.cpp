@@ -1,4 +1,5 @@
 // Bundles: manifests of each system, and the files of the prediction bundle.
+#include "body/model/body_file.h"
 #include "checked_file.h"
 #include "core/json/json_value.h"
 #include "densepose/bundle/manifest.h"
@@ -48,6 +49,7 @@ FUZZ(bundle) {
   with([](Bundle given) { head::HeadBundle{std::move(given)}; });
   with([](Bundle given) { TransformerBundle{CodeBundle{std::move(given)}}; });
   with([](Bundle given) { SceneNetworks(nullptr, std::move(given), {}); });
+  with([](Bundle given) { body::model_of_bundle(given); });
   with([](Bundle given) { EdgeNetwork(nullptr, std::move(given), {}); });
 }
 

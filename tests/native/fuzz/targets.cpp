@@ -43,6 +43,7 @@ constexpr std::pair<const char*, const char*> kFiles[] = {
     {"prior_file", "tiny_head/priors/float32.maqp"},
     {"prior_file", "tiny_head/priors/int8.maqp"},
     {"template_file", "tiny_head/template.maqt"},
+    {"body_file", "tiny_body/body.maqb"},
     {"json", "tiny_head/bundle/manifest.json"},
     {"json", "tiny_scene/capture/transforms.json"},
     {"bundle", "tiny_bundle/manifest.json"},

@@ -5,6 +5,8 @@
 10 shape coefficients; then where `export.teachers.body_model` places every STEP-th vertex and the 33 keypoints, in
 body axes from the first joint, in float64.
 
+`sizes.f64`, of each of SHAPES shapes of the shipped body: 10 coefficients, then height, chest, waist, hip and inseam.
+
     python -m tests.native.generate.make_tiny_body
 """
 
@@ -14,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from scipy.spatial import ConvexHull
 
 from export.body.body_file import FILE, read_body, write_body
 from export.body.body_model import BodyModel
@@ -22,7 +25,8 @@ from tests.python.support.small_body import small_body
 
 FOLDER = Path(__file__).parents[1] / "data" / "tiny_body"
 SHIPPED = Path(__file__).parents[3] / "sdk" / "models" / "body" / FILE
-POSES, STEP = 6, 97
+POSES, STEP, SHAPES = 6, 97, 8
+LEVELS = (0.65, 0.35, -0.05)  # chest, waist, hip: between the hip joints and the neck
 
 
 def puppet_of(model: BodyModel) -> tuple[Puppet, Pieces]:
@@ -34,6 +38,30 @@ def puppet_of(model: BodyModel) -> tuple[Puppet, Pieces]:
     none = torch.zeros(len(model.rest), 3, dtype=torch.float64)
     region = torch.zeros(len(model.rest), 8, dtype=torch.float64)
     return puppet, Pieces(torch.tensor(model.rest), torch.tensor(model.basis), torch.tensor(weights), none, region)
+
+
+def sizes_m(model: BodyModel, shape: np.ndarray) -> list[float]:
+    """Sizes as sdk/src/body/sizes/body_sizes.h defines them."""
+    count = model.vertex_count
+    rest, points = model.rest[:count], (model.rest + np.tensordot(shape, model.basis, 1))[:count]
+    joints = model.joint_rest + np.tensordot(shape, model.joint_basis, 1)
+    weights = np.zeros((count, len(model.joints)))
+    np.add.at(weights, (np.arange(count)[:, None], model.weight_joints[:count]), model.weights[:count])
+    arms = [k for k, name in enumerate(model.joints) if name.startswith(("upper_arm", "lower_arm", "hand"))]
+    torso = model.triangles[(weights[:, arms].sum(1)[model.triangles] < 0.5).all(1)]
+    hips = np.mean([joints[model.joints.index(f"upper_leg.{side}"), 2] for side in "LR"])
+    neck = joints[model.joints.index("neck"), 2]
+    girths = []
+    for level in LEVELS:
+        z = hips + level * (neck - hips)
+        edges = points[torso[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
+        cut = edges[(edges[:, 0, 2] < z) != (edges[:, 1, 2] < z)]
+        t = (z - cut[:, 0, 2]) / (cut[:, 1, 2] - cut[:, 0, 2])
+        girths.append(ConvexHull(cut[:, 0, :2] + t[:, None] * (cut[:, 1, :2] - cut[:, 0, :2])).area)
+    top, sole = rest[:, 2].argmax(), rest[:, 2].argmin()
+    middle = np.flatnonzero((np.abs(rest[:, 0]) <= 0.012) & (weights[:, 0] >= 0.5))
+    crotch = middle[rest[middle, 2].argmin()]
+    return [points[top, 2] - points[sole, 2], *girths, points[crotch, 2] - points[sole, 2]]
 
 
 def main() -> None:
@@ -51,6 +79,9 @@ def main() -> None:
         placed, _ = Puppet.place(points, bones, torch.tensor(shape), torch.zeros(8, dtype=torch.float64))
         rows.append(np.concatenate([rotation.ravel(), shape, placed.numpy()[shown].ravel()]))
     (FOLDER / "poses.f64").write_bytes(np.array(rows).astype("<f8").tobytes())
+    shapes = np.clip(rng.normal(0, 1.2, (SHAPES, len(model.basis))), -3, 3)
+    sizes = [[*shape, *sizes_m(model, shape)] for shape in shapes]
+    (FOLDER / "sizes.f64").write_bytes(np.array(sizes).astype("<f8").tobytes())
 
 
 if __name__ == "__main__":

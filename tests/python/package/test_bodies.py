@@ -40,6 +40,27 @@ def test_with_intrinsics_the_pelvis_has_a_place(people, body):
     assert body.run(people, camera).people[0].pelvis_m[2] > 0.5
 
 
+def test_sizes_have_intervals_and_a_height_sets_the_scale(people, body):
+    camera = maquette.Intrinsics.centred(512, 512, focal_px=700)
+    unknown = body.run(people, camera).people[0]
+    known = body.run(people, camera, heights_m=[1.5] * len(people.people)).people[0]
+    assert not unknown.sizes.is_height_known
+    assert known.sizes.is_height_known
+    for name in ("height", "chest", "waist", "hip", "inseam"):
+        wide, narrow = getattr(unknown.sizes, name), getattr(known.sizes, name)
+        assert wide.low_m < wide.value_m < wide.high_m
+        assert narrow.high_m - narrow.low_m < wide.high_m - wide.low_m
+    assert known.sizes.height.low_m == known.sizes.height.high_m == pytest.approx(1.5)
+    assert known.pelvis_m[2] < unknown.pelvis_m[2]
+
+
+def test_wrong_heights_are_refused_with_a_sentence(people, body):
+    with pytest.raises(ValueError, match="heights_m has 0 numbers"):
+        body.run(people, heights_m=[])
+    with pytest.raises(maquette.MaquetteError, match=r"must be 1\.3 to 2\.3"):
+        body.run(people, heights_m=[178.0] * len(people.people))
+
+
 def test_arrays_of_other_shapes_are_refused_with_a_sentence(body):
     with pytest.raises(ValueError, match="pass \\[H, W, 3\\]"):
         body.run_planes(np.zeros((4, 4), np.uint8), np.zeros((4, 4), np.uint8), [])

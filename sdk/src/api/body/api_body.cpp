@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "api/body/body_handle.h"
 #include "api/boundary.h"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr uint32_t kBodyResults = 4, kMaxBodyResults = 64, kMaxBodies = 255;
 constexpr int32_t kMaxPlaneSide_px = 16384;
+constexpr float kMinHeight_m = 1.3f, kMaxHeight_m = 2.3f;  // what the shapes of the shipped body reach
 constexpr const char* kAngleNames[] = {"left_elbow", "right_elbow", "left_knee",     "right_knee",
                                        "left_hip",   "right_hip",   "left_shoulder", "right_shoulder"};
 static_assert(std::size(kAngleNames) == MAQ_BODY_ANGLE_COUNT && body::kAngles == MAQ_BODY_ANGLE_COUNT);
@@ -60,6 +62,19 @@ body::BodyCamera camera_of(const maq_body_input& input) {
   require_range("input.intrinsics.cx_px", given.cx_px, -1e6, 1e6);
   require_range("input.intrinsics.cy_px", given.cy_px, -1e6, 1e6);
   return {true, given.fx_px, given.fy_px, given.cx_px, given.cy_px};
+}
+
+// 0: unknown.
+double height_of_person(const maq_body_input& input, size_t index) {
+  const float height_m = input.heights_m == nullptr ? 0 : input.heights_m[index];
+  if (height_m != 0) {
+    require_range("input.heights_m[" + std::to_string(index) + "]", height_m, kMinHeight_m, kMaxHeight_m);
+  }
+  return double(height_m);
+}
+
+maq_body_size shown_size(const body::SizeEstimate& size) {
+  return {float(size.value_m), float(size.low_m), float(size.high_m)};
 }
 
 void write_vector(float* to, Vec3 from) { to[0] = float(from.x), to[1] = float(from.y), to[2] = float(from.z); }
@@ -115,7 +130,11 @@ void make_room(const body::BodyModel& model, BodyOfPerson& person) {
 }  // namespace
 
 maq_body::maq_body(std::shared_ptr<const body::BodyModel> of, size_t pool_size)
-    : model(std::move(of)), angle_joints(*model), fitter(*model), results(pool_size, "results") {
+    : model(std::move(of)),
+      sizes(std::make_shared<body::BodySizes>(*model)),
+      angle_joints(*model),
+      fitter(*model),
+      results(pool_size, "results") {
   for (const body::BodyJoint& joint : model->joints) {
     joint_names.push_back(joint.name.c_str());
     joint_parents.push_back(joint.parent);
@@ -159,8 +178,10 @@ maq_status maq_body_run(maq_body* body, const maq_body_input* given, maq_body_re
     const maq_body_input& input = *given;
     const body::LabelImage labels = labels_of(input);
     const body::BodyCamera camera = camera_of(input);
+    for (size_t i = 0; i < input.person_count; ++i) height_of_person(input, i);  // before anything is fitted
     BoundedPool<maq_body_result>::Pooled handle = body->results.acquire();
     handle->model = body->model;
+    handle->sizes = body->sizes;
     handle->count = input.person_count;
     handle->timestamp_ns = input.timestamp_ns;
     if (handle->people.size() < handle->count) handle->people.resize(handle->count);
@@ -170,7 +191,8 @@ maq_status maq_body_run(maq_body* body, const maq_body_input* given, maq_body_re
       make_room(*body->model, person);
       person.id = input.ids == nullptr ? 0 : std::max(input.ids[i], int64_t(0));
       const float* const keypoints = input.keypoints == nullptr ? nullptr : input.keypoints + 99 * i;
-      person.fitted = body->fitter.fit({uint8_t(i + 1), person.id, keypoints});
+      person.height_m = height_of_person(input, i);
+      person.fitted = body->fitter.fit({uint8_t(i + 1), person.id, keypoints, person.height_m});
       person.place_m = place_in_metres(camera, person.fitted.pose.place, input.width_px, input.height_px);
       show(*body, camera, person);
     }
@@ -215,6 +237,30 @@ maq_status maq_body_result_get_person(const maq_body_result* result, uint32_t in
     require_argument(result, "result");
     require_index("index", index, result->count);
     write_struct(person, "person", result->people[index].shown);
+    return MAQ_OK;
+  });
+}
+
+maq_status maq_body_result_get_sizes(const maq_body_result* result, uint32_t index, maq_body_sizes* sizes) {
+  return guarded(result, __func__, [&] {
+    require_argument(result, "result");
+    require_index("index", index, result->count);
+    const BodyOfPerson& person = result->people[index];
+    if (person.fitted.status != body::FitStatus::kFitted) {
+      throw Error(MAQ_ERROR_NOT_FOUND, "Person ", index,
+                  " was not fitted, and has no sizes; check maq_body_person.fit.");
+    }
+    const auto found = estimate_sizes(*result->sizes, result->model->shape_count, person.fitted.pose.shape,
+                                      person.fitted.shape_covariance, person.height_m);
+    const auto of = [&](body::Size size) { return shown_size(found[size_t(size)]); };
+    maq_body_sizes filled{};
+    filled.is_height_known = person.height_m > 0 ? 1 : 0;
+    filled.height = of(body::Size::kHeight);
+    filled.chest = of(body::Size::kChest);
+    filled.waist = of(body::Size::kWaist);
+    filled.hip = of(body::Size::kHip);
+    filled.inseam = of(body::Size::kInseam);
+    write_struct(sizes, "sizes", filled);
     return MAQ_OK;
   });
 }

@@ -8,6 +8,7 @@
 #include "body/files/body_clip.h"
 #include "body/fit/people_fitter.h"
 #include "body/pose/joint_angles.h"
+#include "body/sizes/size_intervals.h"
 #include "maquette/body.h"
 
 namespace maq {
@@ -19,7 +20,8 @@ inline constexpr char kBodyBundle[] = "body";
 struct BodyOfPerson {
   int64_t id = 0;
   body::FittedBody fitted;
-  Vec3 place_m;  // of the pelvis, for files
+  Vec3 place_m;         // of the pelvis, for files
+  double height_m = 0;  // of the input; 0: unknown
   maq_body_person shown{};
   std::vector<float> shape, joint_rotations, joints_m, keypoints_m, vertices_m;
 };
@@ -28,6 +30,7 @@ struct BodyOfPerson {
 
 struct maq_body_result : maq::HandleOf<maq::HandleKind::kBodyResult> {
   std::shared_ptr<const maq::body::BodyModel> model;
+  std::shared_ptr<const maq::body::BodySizes> sizes;
   std::vector<maq::BodyOfPerson> people;  // the first `count` are the result's; all keep their memory
   size_t count = 0;
   int64_t timestamp_ns = 0;
@@ -37,6 +40,7 @@ struct maq_body_result : maq::HandleOf<maq::HandleKind::kBodyResult> {
 struct maq_body : maq::HandleOf<maq::HandleKind::kBody> {
   maq_body(std::shared_ptr<const maq::body::BodyModel> of, size_t pool_size);
   std::shared_ptr<const maq::body::BodyModel> model;
+  std::shared_ptr<const maq::body::BodySizes> sizes;
   maq::body::AngleJoints angle_joints;
   maq::body::PeopleFitter fitter;
   std::vector<const char*> joint_names;

@@ -20,7 +20,12 @@ constexpr double kSeenWeight = 2;  // of the points of a joint's bones that make
 }  // namespace
 
 BodyFitter::BodyFitter(const BodyModel& model, const FitSettings& settings)
-    : model_(model), settings_(settings), equations_(model), starts_(model), damped_(kMaxUnknowns * kMaxUnknowns) {}
+    : model_(model),
+      settings_(settings),
+      equations_(model),
+      starts_(model),
+      damped_(kMaxUnknowns * kMaxUnknowns),
+      by_shape_(kMaxUnknowns * kMaxShapes) {}
 
 double BodyFitter::improve(const FitProblem& problem, int iterations, BodyPose& pose, int& taken) {
   const size_t count = unknown_count(model_);
@@ -90,6 +95,26 @@ void BodyFitter::describe(const FitProblem& problem, FittedBody& body) {
   for (size_t j = 0; j < model_.joints.size(); ++j) body.seen_joints |= seen[j] >= kSeenWeight ? 1u << j : 0u;
 }
 
+bool BodyFitter::find_shape_covariance(FitProblem problem, FittedBody& body) {
+  // Frames share their errors, so earlier ones make the shape steady but not more certain.
+  problem.shape.precision = ShapePrior{}.precision;
+  if (!std::isfinite(equations_.linearize(problem, body.pose))) return false;
+  const size_t count = unknown_count(model_), shapes = model_.shape_count;
+  for (size_t row = 0; row < count; ++row) {
+    std::copy_n(equations_.matrix().data() + row * kMaxUnknowns, row + 1, damped_.data() + row * kMaxUnknowns);
+    damped_[row * kMaxUnknowns + row] += 1e-12;
+  }
+  std::fill(by_shape_.begin(), by_shape_.end(), 0.0);
+  for (size_t s = 0; s < shapes; ++s) by_shape_[(shape_unknown(model_) + s) * shapes + s] = 1;
+  if (!solve_positive(damped_.data(), int(count), int(kMaxUnknowns), by_shape_.data(), int(shapes))) return false;
+  for (size_t a = 0; a < shapes; ++a) {
+    for (size_t b = 0; b < shapes; ++b) {
+      body.shape_covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
+    }
+  }
+  return true;
+}
+
 FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before,
                            const ShapePrior& shape) {
   FittedBody body;
@@ -114,8 +139,8 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
   }
   if (!std::isfinite(cost)) cost = from_starts(problem, body.pose, body.iterations);
   if (std::isfinite(cost)) describe(problem, body);
-  body.status =
-      std::isfinite(cost) && body.inlier_fraction >= kMinInliers ? FitStatus::kFitted : FitStatus::kUnreliable;
+  const bool is_fitted = std::isfinite(cost) && body.inlier_fraction >= kMinInliers;
+  body.status = is_fitted && find_shape_covariance(problem, body) ? FitStatus::kFitted : FitStatus::kUnreliable;
   if (body.status != FitStatus::kFitted) body.pose = mean_pose(model_);
   return body;
 }

@@ -7,6 +7,7 @@
 
 #include "body/fit/fit_equations.h"
 #include "body/fit/starting_pose.h"
+#include "body/sizes/size_intervals.h"
 
 namespace maq::body {
 
@@ -22,7 +23,8 @@ struct FittedBody {
   double inlier_fraction = 0;  // of surface points: those that agree with the pose
   double error_px = 0;         // root mean square distance of the points that agree
   int iterations = 0;
-  uint32_t seen_joints = 0;  // bit j: pixels show bones of joint j; the other joints follow the prior
+  uint32_t seen_joints = 0;            // bit j: pixels show bones of joint j; the other joints follow the prior
+  ShapeCovariance shape_covariance{};  // of this image alone, from the curvature of the cost; of kFitted
 };
 
 struct FitSettings {
@@ -49,12 +51,14 @@ class BodyFitter {
   double improve(const FitProblem& problem, int iterations, BodyPose& pose, int& taken);
   double from_starts(const FitProblem& problem, BodyPose& pose, int& taken);
   void describe(const FitProblem& problem, FittedBody& body);
+  // False where the equations of `body.pose` are singular.
+  bool find_shape_covariance(FitProblem problem, FittedBody& body);
 
   const BodyModel& model_;
   const FitSettings settings_;
   FitEquations equations_;
   StartingPoses starts_;
-  std::vector<double> damped_;
+  std::vector<double> damped_, by_shape_;
 };
 
 }  // namespace maq::body

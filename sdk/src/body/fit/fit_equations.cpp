@@ -23,7 +23,8 @@ double number(Vec3 v, size_t axis) { return axis == 0 ? v.x : axis == 1 ? v.y : 
 
 }  // namespace
 
-FitEquations::FitEquations(const BodyModel& model) : model_(model), matrix_(kMaxUnknowns * kMaxUnknowns) {
+FitEquations::FitEquations(const BodyModel& model)
+    : model_(model), height_(height_of(model)), matrix_(kMaxUnknowns * kMaxUnknowns) {
   for (size_t j = 0; j < model.joints.size(); ++j) {
     const int parent = model.joints[j].parent;
     ancestors_[j] = (parent < 0 ? 0u : ancestors_[size_t(parent)]) | 1u << j;
@@ -179,6 +180,17 @@ double FitEquations::add_priors(const FitProblem& problem, const BodyPose& pose,
     const size_t row = shape_unknown(model_) + s;
     add_to(row, row, problem.shape.precision);
     gradient_[row] += problem.shape.precision * off;
+  }
+  if (!(problem.shape.height_m > 0)) return cost;
+  constexpr double kPrecision = 1 / (kHeightError_m * kHeightError_m);
+  const double off_m = height_.of(pose.shape) - problem.shape.height_m;
+  cost += kPrecision * off_m * off_m;
+  if (!with_equations) return cost;
+  for (size_t s = 0; s < model_.shape_count; ++s) {
+    const size_t row = shape_unknown(model_) + s;
+    const double slope = kPrecision * height_.by_shape_m[s];
+    for (size_t t = 0; t <= s; ++t) add_to(row, shape_unknown(model_) + t, slope * height_.by_shape_m[t]);
+    gradient_[row] += slope * off_m;
   }
   return cost;
 }

@@ -7,6 +7,7 @@
 
 #include "body/fit/observations.h"
 #include "body/pose/body_bones.h"
+#include "body/sizes/body_sizes.h"
 
 namespace maq::body {
 
@@ -20,9 +21,12 @@ inline size_t unknown_count(const BodyModel& model) { return shape_unknown(model
 
 // A shape that is expected, with the precision of each coefficient.
 struct ShapePrior {
-  std::array<double, kMaxShapes> mean{};
+  ShapeNumbers mean{};
   double precision = 1;
+  double height_m = 0;  // of the person, known to kHeightError_m; 0: unknown
 };
+
+inline constexpr double kHeightError_m = 0.003;
 
 struct FitProblem {
   const Observations* seen = nullptr;
@@ -70,6 +74,7 @@ class FitEquations {
   void add_to(size_t i, size_t j, double value) { matrix_[i * kMaxUnknowns + j] += value; }
 
   const BodyModel& model_;
+  const ShapeLength height_;
   BodyBones bones_;
   std::array<uint32_t, kMaxJoints> ancestors_;             // bit k: joint k moves this joint's bones
   std::array<std::array<Vec3, 3>, kMaxJoints> turn_axes_;  // how bones turn by each number of a joint's rotation vector

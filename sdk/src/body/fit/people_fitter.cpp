@@ -71,6 +71,7 @@ FittedBody PeopleFitter::fit(const PersonRequest& person) {
     shape.precision += kPrecisionOfFrame * track->frames;
     before = track->pose;
   }
+  shape.height_m = person.height_m;
   body = fitter_.fit(seen_, camera_, is_warm ? &before : nullptr, shape);
   if (body.status == FitStatus::kFitted && person.id != 0) keep(person.id, body.pose);
   return body;

@@ -13,6 +13,7 @@ struct PersonRequest {
   uint8_t number = 0;                // in the person plane
   int64_t id = 0;                    // 0: unknown, so that the person has no earlier frames
   const float* keypoints = nullptr;  // [33][3], null for none
+  double height_m = 0;               // 0: unknown
 };
 
 class PeopleFitter {

@@ -2,12 +2,12 @@
 #include <filesystem>
 #include <maquette/maquette.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "arguments/bundle_argument.h"
 #include "arguments/densepose_options.h"
+#include "commands/body/body_text.h"
 #include "commands/commands.h"
 #include "commands/source_frames.h"
 #include "output/output_file.h"
@@ -21,7 +21,7 @@ namespace {
 struct BodyOptions {
   std::string source, out, bvh, bundle;
   ModelOptions model;
-  double focal_px = 0;
+  double focal_px = 0, height_m = 0;
   bool json = false;
   FrameLimits limits;
 };
@@ -38,31 +38,6 @@ std::string path_of_person(const std::string& path, uint32_t index) {
   name += "_" + std::to_string(index + 1);
   name += whole.extension();
   return (whole.parent_path() / name).u8string();
-}
-
-nlohmann::ordered_json angles_of(const maq_body_person& person) {
-  nlohmann::ordered_json angles = nlohmann::ordered_json::object();
-  for (int32_t i = 0; i < MAQ_BODY_ANGLE_COUNT; ++i) {
-    angles[maq_body_get_angle_name(i)] = std::round(10 * double(person.angles_deg[i])) / 10;
-  }
-  return angles;
-}
-
-void print_people(const std::string& stem, const maq_frame_desc& desc, const std::vector<maq_body_person>& people) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const maq_body_person& person : people) {
-    nlohmann::ordered_json item = {{"id", person.id}, {"is_fitted", person.fit == MAQ_BODY_FIT_FITTED}};
-    if (person.fit == MAQ_BODY_FIT_FITTED) {
-      item["pelvis_px"] = person.pelvis_px;
-      item["scale_px_per_m"] = person.scale_px_per_m;
-      item["error_px"] = person.error_px;
-      item["angles_deg"] = angles_of(person);
-      item["keypoints_m"] = std::vector<float>(person.keypoints_m, person.keypoints_m + 3 * MAQ_BODY_KEYPOINT_COUNT);
-    }
-    list.push_back(item);
-  }
-  print_output("%s\n", json_text({{"frame", stem}, {"timestamp_ns", desc.timestamp_ns}, {"people", list}}).c_str());
-  flush_output();
 }
 
 void write_files(const BodyOptions& options, maquette::BodyClip& clip, const BodyCounts& counts) {
@@ -106,6 +81,7 @@ int run_body(const BodyOptions& options) {
   maquette::BodyClip clip(body);
   std::unique_ptr<maquette::DensePose> densepose;
   BodyCounts counts;
+  SizesOfPeople sizes;
   const auto load = [&](const maquette::Source& source) {
     densepose =
         std::make_unique<maquette::DensePose>(context, config_of(options.model, densepose_bundle, !is_clip(source)));
@@ -124,25 +100,27 @@ int run_body(const BodyOptions& options) {
                            {}};
       }
       const maquette::DensePoseResult found = densepose->run(given.frame);
-      const maquette::BodyResult fitted = body.run(found, desc);
+      const std::vector<float> heights(found.people().size(), float(options.height_m));
+      const maquette::BodyResult fitted = body.run(found, desc, heights);
       const std::vector<maq_body_person> people = fitted.people();
       ++counts.frames;
-      for (const maq_body_person& person : people) {
-        ++(person.fit == MAQ_BODY_FIT_FITTED ? counts.fitted : counts.not_fitted);
+      for (uint32_t i = 0; i < people.size(); ++i) {
+        const bool is_fitted = people[i].fit == MAQ_BODY_FIT_FITTED;
+        ++(is_fitted ? counts.fitted : counts.not_fitted);
+        if (is_fitted) sizes[people[i].id] = fitted.sizes(i);
       }
       clip.add(fitted);
-      if (options.json) print_people(given.stem, desc, people);
-      if (is_photo && !options.json) {
-        for (const maq_body_person& person : people) {
-          if (person.fit == MAQ_BODY_FIT_FITTED)
-            print_output("person %lld  %s\n", (long long)person.id, angles_of(person).dump().c_str());
-        }
+      if (options.json) {
+        print_output("%s\n", json_of_frame(given.stem, desc, people, fitted).c_str());
+        flush_output();
       }
+      if (is_photo && !options.json) print_angles(people);
       return std::to_string(people.size()) + " people";
     });
   };
   const int exit_code = run_sources(context, arguments, load, run);
   if (exit_code != 0 && counts.frames == 0) return exit_code;
+  if (!options.json) print_sizes(sizes);
   if (!options.out.empty() || !options.bvh.empty()) write_files(options, clip, counts);
   return exit_code;
 }
@@ -165,14 +143,20 @@ void add_body_command(CLI::App& app, int* exit_code) {
                    "Focal length of the camera in pixels. Without it and without a calibrated source, people are "
                    "seen in weak perspective")
       ->check(CLI::Range(10.0, 1e5));
-  command->add_flag("--json", options->json, "Print angles and keypoints as one JSON line per frame");
+  command
+      ->add_option("--height", options->height_m,
+                   "True height of the people in metres; sets the scale of all bodies. Without it, people have the "
+                   "average height, and their sizes wide intervals")
+      ->check(CLI::Range(1.3, 2.3));
+  command->add_flag("--json", options->json, "Print angles, keypoints and sizes as one JSON line per frame");
   add_model_options(*command, options->model);
   add_frame_limits(*command, options->limits);
   command->footer(
-      "A person keeps one shape for the whole clip. People are told apart by their ids.\n\n"
+      "A person keeps one shape for the whole clip. People are told apart by their ids.\n"
+      "The table of sizes has the last frame of each person, with intervals that contain 90 % of true sizes.\n\n"
       "Examples:\n"
       "  maquette body dance.mp4 --out dance.glb --bvh dance.bvh\n"
-      "  maquette body photo.jpg --out body.glb\n"
+      "  maquette body photo.jpg --out body.glb --height 1.78\n"
       "  maquette body walk.mp4 --json --focal-length 900");
   command->callback([=] { *exit_code = run_body(*options); });
 }

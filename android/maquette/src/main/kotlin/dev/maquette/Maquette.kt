@@ -190,6 +190,15 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
             DensePose(Native.maq_densepose_create(context, config.native(bundle)))
         }
 
+    /**
+     * Loads the body that [Body.run] fits to people; it has no network. Takes some 10 ms.
+     *
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
+     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task).
+     */
+    fun body(bundle: ModelBundle, config: Body.Config = Body.Config()): Body =
+        handle.use { context -> Body(Native.maq_body_create(context, config.native(bundle))) }
+
     /** Loads the network of edges; takes some 10 ms, so not on the main thread. */
     fun edges(bundle: ModelBundle, config: Edges.Config = Edges.Config()): Edges =
         handle.use { context ->

@@ -9,6 +9,7 @@ object TestFiles {
     private val root = File(System.getProperty("maquette.root")!!)
     val bundle = File(root, "sdk/models/densepose-b-int8")
     val scenesBundle = File(root, "sdk/models/scenes-int8")
+    val bodyBundle = File(root, "sdk/models/body")
     val edgesBundle = File(root, "sdk/models/edges-int8")
     val headsBundle = File(root, "sdk/models/heads-int8")
     val predictionBundle = File(root, "sdk/models/prediction-int8")

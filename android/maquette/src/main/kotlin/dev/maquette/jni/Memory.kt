@@ -111,6 +111,8 @@ internal class Pointer(private val of: Memory, private val at: Int = 0) {
 
     fun floats(count: Int) = FloatArray(count).also { bytes(4L * count).asFloatBuffer().get(it) }
 
+    fun ints(count: Int) = IntArray(count).also { bytes(4L * count).asIntBuffer().get(it) }
+
     fun doubles(count: Int) = DoubleArray(count).also { bytes(8L * count).asDoubleBuffer().get(it) }
 }
 

@@ -12,6 +12,21 @@ internal object Native {
         System.loadLibrary("maquette_jni")
     }
 
+    @JvmStatic external fun maq_body_clip_add_result(clip: Long, result: Long)
+    @JvmStatic external fun maq_body_clip_create(body: Long): Long
+    @JvmStatic external fun maq_body_clip_destroy(clip: Long)
+    @JvmStatic external fun maq_body_clip_get_person_count(clip: Long): Int
+    @JvmStatic external fun maq_body_clip_save(clip: Long, path: Memory?)
+    @JvmStatic external fun maq_body_clip_save_person(clip: Long, index: Int, path: Memory?)
+    @JvmStatic external fun maq_body_create(context: Long, config: Memory?): Long
+    @JvmStatic external fun maq_body_destroy(body: Long)
+    @JvmStatic external fun maq_body_get_mesh(body: Long, mesh: Memory?)
+    @JvmStatic external fun maq_body_reset(body: Long)
+    @JvmStatic external fun maq_body_result_get_person(result: Long, index: Int, person: Memory?)
+    @JvmStatic external fun maq_body_result_get_person_count(result: Long): Int
+    @JvmStatic external fun maq_body_result_get_sizes(result: Long, index: Int, sizes: Memory?)
+    @JvmStatic external fun maq_body_result_release(result: Long)
+    @JvmStatic external fun maq_body_run(body: Long, input: Memory?): Long
     @JvmStatic external fun maq_camera_list_create(context: Long): Long
     @JvmStatic external fun maq_camera_list_destroy(list: Long)
     @JvmStatic external fun maq_camera_list_get_camera(list: Long, index: Int, info: Memory?)
@@ -194,6 +209,12 @@ internal object Native {
     @JvmStatic external fun maq_source_stop(source: Long)
 }
 
+internal const val MAQ_BODY_ANGLE_LEFT_ELBOW = 0; internal const val MAQ_BODY_ANGLE_RIGHT_ELBOW = 1
+internal const val MAQ_BODY_ANGLE_LEFT_KNEE = 2; internal const val MAQ_BODY_ANGLE_RIGHT_KNEE = 3
+internal const val MAQ_BODY_ANGLE_LEFT_HIP = 4; internal const val MAQ_BODY_ANGLE_RIGHT_HIP = 5
+internal const val MAQ_BODY_ANGLE_LEFT_SHOULDER = 6; internal const val MAQ_BODY_ANGLE_RIGHT_SHOULDER = 7
+internal const val MAQ_BODY_FIT_FITTED = 0; internal const val MAQ_BODY_FIT_TOO_FEW_PIXELS = 1
+internal const val MAQ_BODY_FIT_UNRELIABLE = 2
 internal const val MAQ_CLOCK_MEDIA = 1; internal const val MAQ_CLOCK_MONOTONIC = 2
 internal const val MAQ_DENSEPOSE_CROPS_DEFAULT = 0; internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
 internal const val MAQ_DENSEPOSE_CROPS_ALL = 2; internal const val MAQ_DENSEPOSE_CROPS_OFF = 3
@@ -257,10 +278,55 @@ internal const val MAQ_ERROR_INTERNAL = 12; internal const val MAQ_END_OF_STREAM
 internal const val MAQ_TIMEOUT = 14; internal const val MAQ_ERROR_DEVICE_LOST = 15
 internal const val MAQ_ERROR_BUSY = 16; internal const val MAQ_ERROR_NO_PERMISSION = 17
 internal const val MAQ_ERROR_UNWRITABLE = 18; internal const val MAQ_CANCELLED = 19
-internal const val MAQ_HEADER_VERSION = 300; internal const val MAQ_DENSEPOSE_KEYPOINT_COUNT = 33
-internal const val MAQ_HEAD_ALL_TRIANGLES = -1; internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1
-internal const val MAQ_SCENE_LONG_SIDE_FULL = -1; internal const val MAQ_SCENE_VARIATION_ALL = -1
-internal const val MAQ_THREADS_MEASURED = -1; internal const val MAQ_WAIT_FOREVER = -1
+internal const val MAQ_HEADER_VERSION = 300; internal const val MAQ_BODY_KEYPOINT_COUNT = 33
+internal const val MAQ_DENSEPOSE_KEYPOINT_COUNT = 33; internal const val MAQ_HEAD_ALL_TRIANGLES = -1
+internal const val MAQ_HEAD_SHADING_STRENGTH_OFF = -1; internal const val MAQ_SCENE_LONG_SIDE_FULL = -1
+internal const val MAQ_SCENE_VARIATION_ALL = -1; internal const val MAQ_THREADS_MEASURED = -1
+internal const val MAQ_WAIT_FOREVER = -1
+
+internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32, outer, at) {
+    var threads: Int get() = int(0); set(v) = int(0, v); var provider: Int get() = int(4); set(v) = int(4, v)
+    var bundle_file_count: Int get() = int(8); set(v) = int(8, v); val bundle_path get() = Pointer(this, 16)
+    val bundle_files get() = Pointer(this, 24)
+}
+
+internal class maq_body_config(outer: Memory? = null, at: Int = 0) : Struct(48, outer, at) {
+    val model = maq_model_options(this, 8); var result_pool_size: Int get() = int(40); set(v) = int(40, v)
+}
+
+internal class maq_body_input(outer: Memory? = null, at: Int = 0) : Struct(104, outer, at) {
+    var width_px: Int get() = int(4); set(v) = int(4, v); var height_px: Int get() = int(8); set(v) = int(8, v)
+    val part get() = Pointer(this, 16); val u get() = Pointer(this, 24); val v get() = Pointer(this, 32)
+    val person get() = Pointer(this, 40); var stride_bytes: Long get() = long(48); set(v) = long(48, v)
+    var person_count: Int get() = int(56); set(v) = int(56, v); val ids get() = Pointer(this, 64)
+    val keypoints get() = Pointer(this, 72); val intrinsics get() = Pointer(this, 80)
+    var timestamp_ns: Long get() = long(88); set(v) = long(88, v); val heights_m get() = Pointer(this, 96)
+}
+
+internal class maq_body_mesh(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
+    val vertex_count get() = int(4); val triangle_count get() = int(8); val triangles get() = Pointer(this, 16)
+    val joint_count get() = int(24); val joint_names get() = Pointer(this, 32)
+    val joint_parents get() = Pointer(this, 40); val shape_count get() = int(48)
+}
+
+internal class maq_body_person(outer: Memory? = null, at: Int = 0) : Struct(168, outer, at) {
+    val fit get() = int(4); val id get() = long(8); val inlier_fraction get() = float(16)
+    val error_px get() = float(20); val iteration_count get() = int(24); val seen_joints get() = int(28)
+    val is_metric get() = int(32); val pelvis_m get() = floats(36, 3); val pelvis_px get() = floats(48, 2)
+    val scale_px_per_m get() = float(56); val orientation get() = floats(60, 9); val angles_deg get() = floats(96, 8)
+    val shape get() = Pointer(this, 128); val joint_rotations get() = Pointer(this, 136)
+    val joints_m get() = Pointer(this, 144); val keypoints_m get() = Pointer(this, 152)
+    val vertices_m get() = Pointer(this, 160)
+}
+
+internal class maq_body_size(outer: Memory? = null, at: Int = 0) : Memory(12, outer, at) {
+    val value_m get() = float(0); val low_m get() = float(4); val high_m get() = float(8)
+}
+
+internal class maq_body_sizes(outer: Memory? = null, at: Int = 0) : Struct(68, outer, at) {
+    val is_height_known get() = int(4); val height = maq_body_size(this, 8); val chest = maq_body_size(this, 20)
+    val waist = maq_body_size(this, 32); val hip = maq_body_size(this, 44); val inseam = maq_body_size(this, 56)
+}
 
 internal class maq_camera_info(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
     val uri get() = Pointer(this, 8); val name get() = Pointer(this, 16); val bus get() = Pointer(this, 24)
@@ -314,12 +380,6 @@ internal class maq_concealer_stats(outer: Memory? = null, at: Int = 0) : Struct(
 internal class maq_context_config(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
     var log_level: Int get() = int(4); set(v) = int(4, v); var log_callback: Long get() = long(8); set(v) = long(8, v)
     val onnxruntime_library get() = Pointer(this, 24)
-}
-
-internal class maq_model_options(outer: Memory? = null, at: Int = 0) : Memory(32, outer, at) {
-    var threads: Int get() = int(0); set(v) = int(0, v); var provider: Int get() = int(4); set(v) = int(4, v)
-    var bundle_file_count: Int get() = int(8); set(v) = int(8, v); val bundle_path get() = Pointer(this, 16)
-    val bundle_files get() = Pointer(this, 24)
 }
 
 internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {

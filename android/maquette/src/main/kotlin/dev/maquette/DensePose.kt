@@ -274,6 +274,23 @@ class DensePoseResult internal constructor(pointer: Long, release: (Long) -> Uni
         }
 
     /**
+     * Finds the pixel of a person that shows a point of the body surface; null where no pixel shows the part. The other
+     * direction is in the planes.
+     *
+     * @param person index in [people].
+     * @param part 1 to 24.
+     * @param u 0 to 1, as [v].
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for values out of their ranges.
+     */
+    fun findPixel(person: Int, part: Int, u: Float, v: Float): SurfacePixel? =
+        orNull(Status.NOT_FOUND) {
+            val found = Memory(2 * Float.SIZE_BYTES)
+            val distance = Memory(Float.SIZE_BYTES)
+            handle.use { Native.maq_densepose_result_find_pixel(it, person, part, u, v, found, distance) }
+            SurfacePixel(found.float(0), found.float(4), distance.float(0))
+        }
+
+    /**
      * A plane as it lies in native memory, [heightPx] rows of [widthPx] bytes, read-only and without a copy. It must
      * not be read after the result has been closed: [copyPlane] gives what stays.
      */

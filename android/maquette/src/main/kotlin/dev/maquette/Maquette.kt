@@ -191,6 +191,18 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
         }
 
     /**
+     * An empty texture for one person.
+     *
+     * @param tilePx width and height of the tile of a part, 8 to 512; 0: 64.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for another size.
+     */
+    fun densePoseTexture(tilePx: Int = 0): DensePoseTexture =
+        handle.use { context ->
+            val config = maq_densepose_texture_config().also { it.tile_px = tilePx }
+            DensePoseTexture(Native.maq_densepose_texture_create(context, config))
+        }
+
+    /**
      * Loads the body that [Body.run] fits to people; it has no network. Takes some 10 ms.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],

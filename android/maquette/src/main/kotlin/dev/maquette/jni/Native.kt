@@ -58,6 +58,8 @@ internal object Native {
     @JvmStatic external fun maq_densepose_model_set_frame_budget(model: Long, budget_ms: Double)
     @JvmStatic external fun maq_densepose_model_set_roll(model: Long, roll_rad: Float)
     @JvmStatic external fun maq_densepose_reset(densepose: Long)
+    @JvmStatic external fun maq_densepose_result_find_pixel(result: Long, index: Int, part: Int, u: Float, v: Float,
+        pixel_px: Memory?, distance: Memory?)
     @JvmStatic external fun maq_densepose_result_get_head_box(result: Long, index: Int, box_px: Memory?)
     @JvmStatic external fun maq_densepose_result_get_keypoints(result: Long, index: Int, keypoints: Memory?)
     @JvmStatic external fun maq_densepose_result_get_person(result: Long, index: Int, person: Memory?)
@@ -70,6 +72,13 @@ internal object Native {
     @JvmStatic external fun maq_densepose_result_save(result: Long, path: Memory?)
     @JvmStatic external fun maq_densepose_run(densepose: Long, frame: Long): Long
     @JvmStatic external fun maq_densepose_set_roll(densepose: Long, roll_rad: Float)
+    @JvmStatic external fun maq_densepose_texture_add_person(texture: Long, result: Long, index: Int, frame: Long)
+    @JvmStatic external fun maq_densepose_texture_create(context: Long, config: Memory?): Long
+    @JvmStatic external fun maq_densepose_texture_destroy(texture: Long)
+    @JvmStatic external fun maq_densepose_texture_draw(texture: Long, rgba: Memory?, stride_bytes: Long,
+        size_bytes: Long)
+    @JvmStatic external fun maq_densepose_texture_get_size(texture: Long, width_px: Memory?, height_px: Memory?)
+    @JvmStatic external fun maq_densepose_texture_save(texture: Long, path: Memory?)
     @JvmStatic external fun maq_edges_cancel(edges: Long)
     @JvmStatic external fun maq_edges_create(context: Long, config: Memory?): Long
     @JvmStatic external fun maq_edges_curves_get_box(curves: Long, index: Int, box: Memory?)
@@ -419,6 +428,10 @@ internal class maq_densepose_stats(outer: Memory? = null, at: Int = 0) : Struct(
 
 internal class maq_densepose_surface(outer: Memory? = null, at: Int = 0) : Struct(16, outer, at) {
     val nodes get() = int(4); val points_m get() = Pointer(this, 8)
+}
+
+internal class maq_densepose_texture_config(outer: Memory? = null, at: Int = 0) : Struct(8, outer, at) {
+    var tile_px: Int get() = int(4); set(v) = int(4, v)
 }
 
 internal class maq_edges_box(outer: Memory? = null, at: Int = 0) : Struct(160, outer, at) {

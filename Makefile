@@ -67,7 +67,7 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 	@.venv/bin/python -m tests.hostile --json build/hostile.json
 
 .PHONY: test-glb
-test-glb: build  ## heads as .glb by the Khronos validator; needs node and npm; not part of `test-all`
+test-glb: build  ## heads and bodies as .glb by the Khronos validator and in three.js; needs node and npm; not part of `test-all`
 	@scripts/test-glb.sh
 
 FUZZ_SECONDS ?= 600

@@ -9,7 +9,8 @@ definitions of sdk/src/body/sizes/body_sizes.h.
 
 For each size: `error`, mean of |fitted / true - 1|; `bias`, mean of fitted / true - 1; `width`, mean half width of the
 90 % interval, relative; `inside`, how many true sizes lie in it; `average`, the error of the mean of these people
-instead, scaled to the height where that is known. --fit prints the constants of sdk/src/body/sizes/size_intervals.cpp.
+instead, scaled to the height where that is known. --fit prints by which factor the intervals of the library
+should grow (kSpread in sdk/src/body/sizes/size_intervals.cpp).
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from pathlib import Path
 import cv2
 import maquette
 import numpy as np
-from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
 from export.camera import Camera
@@ -36,7 +36,6 @@ HEIGHT_RANGE_M = 1.3, 2.3  # of heights that the fit accepts
 _ARMS = ("upperarm", "lowerarm", "wrist", "finger", "metacarpal")
 _MIDDLE_M = 0.012
 _MAX_BODIES = 1 << 20
-_QUANTILE = 1.645
 
 
 class Tailor:
@@ -170,24 +169,14 @@ def summary(rows: np.ndarray, is_height_known: bool) -> dict[str, dict[str, floa
     return out
 
 
-def fitted_errors(rows: np.ndarray) -> list[tuple[float, float]]:
-    """Spread and floor of each size (size_intervals.cpp) that make the errors likely, and 90 % of them lie inside. The
-    library that made the rows must have spread 1 and floor 0."""
+def needed_factors(rows: np.ndarray) -> list[float]:
+    """For each size, the factor of all intervals (kSpread of size_intervals.cpp) with which 90 % of true sizes are
+    inside."""
     out = []
     for k in range(len(SIZES)):
         true, value, low, high = rows[:, k].T
-        error, own = np.log(value / true), np.log(high / low) / (2 * _QUANTILE)
-
-        def cost(log_scales: np.ndarray, error=error, own=own) -> float:
-            deviation = np.hypot(np.exp(log_scales[0]) * own, np.exp(log_scales[1]))
-            return float((np.log(deviation) + np.abs(error) / deviation).sum())
-
-        best = min(
-            (minimize(cost, [start, -3], method="Nelder-Mead") for start in (-1, 0, 1)), key=lambda found: found.fun
-        )
-        spread, floor = np.exp(best.x)
-        scale = np.quantile(np.abs(error) / np.hypot(spread * own, floor), 0.9) / _QUANTILE
-        out.append((float(scale * spread), float(scale * floor)))
+        width = np.log(high / low) / 2
+        out.append(float(np.quantile(np.abs(np.log(value / true)) / width, 0.9)) if (width > 1e-9).all() else 1.0)
     return out
 
 
@@ -199,7 +188,7 @@ def main() -> None:
     parser.add_argument("--bundle", type=Path, default=Path("sdk/models/body"))
     parser.add_argument("--densepose", type=Path, default=Path("sdk/models/densepose-b-int8"))
     parser.add_argument("--places", type=Path, default=Path(".data"), help="folder of backgrounds and panoramas")
-    parser.add_argument("--fit", action="store_true", help="print the constants of size_intervals.cpp")
+    parser.add_argument("--fit", action="store_true", help="print factors of the intervals")
     parser.add_argument("--out", type=Path, help="JSON")
     options = parser.parse_args()
     cv2.setNumThreads(1)
@@ -211,7 +200,7 @@ def main() -> None:
             print(f"    {size:7}", "  ".join(f"{key} {100 * value:.1f} %" for key, value in row[size].items()))
     if options.fit:
         for name, found in rows.items():
-            print(name, ", ".join(f"{{{spread:.2f}, {floor:.4f}}}" for spread, floor in fitted_errors(found)))
+            print(name, ", ".join(f"{factor:.3f}" for factor in needed_factors(found)))
     if options.out:
         options.out.write_text(json.dumps({"table": table, "rows": {n: r.tolist() for n, r in rows.items()}}) + "\n")
 

@@ -46,7 +46,7 @@ FittedBody fitted(const Observations& seen, double height_m) {
 }
 
 std::array<SizeEstimate, kSizes> sizes_of(const FittedBody& body, double height_m) {
-  return estimate_sizes(BodySizes(model()), model().shape_count, body.pose.shape, body.shape_covariance, height_m);
+  return estimate_sizes(BodySizes(model()), model().shape_count, body.size_shape, height_m);
 }
 
 double width_of(const SizeEstimate& size) { return std::log(size.high_m / size.low_m); }
@@ -73,6 +73,22 @@ TEST(BodySizes, OfTheMeanBodyAreThoseOfAPerson) {
   EXPECT_GT(found[kChest], found[kWaist]);
   EXPECT_GT(found[kInseam], 0.4 * found[kHeight]);
   EXPECT_LT(found[kInseam], 0.52 * found[kHeight]);
+}
+
+TEST(BodySizes, TheShapeOfSizesIsThatOfAStrongerPrior) {
+  // Two coefficients that an image tells with precisions 3 and 0, against a prior of 1.
+  ShapeNumbers fitted{};
+  fitted[0] = 1.5;  // 3 * 2 / (3 + 1)
+  ShapeCovariance covariance{};
+  covariance[0] = 1.0 / 4, covariance[kMaxShapes + 1] = 1;
+  SizeShape shape;
+  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, shape));
+  EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12);
+  EXPECT_NEAR(shape.mean[1], 0, 1e-12);
+  EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12);
+  EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12);  // as before any image
+  covariance[0] = 0;
+  EXPECT_FALSE(find_shape_for_sizes(2, fitted, covariance, shape));
 }
 
 // A tube of 1 m with a square section of 0.4 m, with an arm beside it.
@@ -196,9 +212,9 @@ TEST(BodySizes, EarlierFramesDoNotMakeIntervalsNarrower) {
 
 TEST(BodySizes, ABodyWithASizeOfZeroHasNoSizesInsteadOfNonsense) {
   const BodyModel model = tube();
-  ShapeNumbers flat{};
-  flat[0] = -1;  // no width, and its inseam is 0
-  const auto sizes = estimate_sizes(BodySizes(model), 1, flat, ShapeCovariance{}, 0);
+  SizeShape flat;
+  flat.mean[0] = -1;  // no width, and its inseam is 0
+  const auto sizes = estimate_sizes(BodySizes(model), 1, flat, 0);
   for (const SizeEstimate& size : sizes) EXPECT_EQ(size.value_m, 0);
 }
 

@@ -64,8 +64,8 @@ ALLOWED = {
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
     "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
-        "export.body", "export.bundle", "export.camera", "export.densepose", "export.jobs", "export.keypoints", "export.people",
-        "export.photos", "export.shards", "export.surface", "export.teachers", "export.training",
+        "export.body", "export.bundle", "export.camera", "export.densepose", "export.jobs", "export.keypoints",
+        "export.people", "export.photos", "export.shards", "export.surface", "export.teachers", "export.training",
     },
     "quantization": {"export"},
     "benchmarks": {"export", "quantization"},

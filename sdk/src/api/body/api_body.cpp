@@ -250,8 +250,8 @@ maq_status maq_body_result_get_sizes(const maq_body_result* result, uint32_t ind
       throw Error(MAQ_ERROR_NOT_FOUND, "Person ", index,
                   " was not fitted, and has no sizes; check maq_body_person.fit.");
     }
-    const auto found = estimate_sizes(*result->sizes, result->model->shape_count, person.fitted.pose.shape,
-                                      person.fitted.shape_covariance, person.height_m);
+    const auto found =
+        estimate_sizes(*result->sizes, result->model->shape_count, person.fitted.size_shape, person.height_m);
     const auto of = [&](body::Size size) { return shown_size(found[size_t(size)]); };
     maq_body_sizes filled{};
     filled.is_height_known = person.height_m > 0 ? 1 : 0;

@@ -95,9 +95,9 @@ void BodyFitter::describe(const FitProblem& problem, FittedBody& body) {
   for (size_t j = 0; j < model_.joints.size(); ++j) body.seen_joints |= seen[j] >= kSeenWeight ? 1u << j : 0u;
 }
 
-bool BodyFitter::find_shape_covariance(FitProblem problem, FittedBody& body) {
-  // Frames share their errors, so earlier ones make the shape steady but not more certain.
-  problem.shape.precision = ShapePrior{}.precision;
+bool BodyFitter::find_size_shape(FitProblem problem, FittedBody& body) {
+  // Frames share their errors, so earlier ones do not count.
+  problem.shape.precision = 1;
   if (!std::isfinite(equations_.linearize(problem, body.pose))) return false;
   const size_t count = unknown_count(model_), shapes = model_.shape_count;
   for (size_t row = 0; row < count; ++row) {
@@ -107,12 +107,13 @@ bool BodyFitter::find_shape_covariance(FitProblem problem, FittedBody& body) {
   std::fill(by_shape_.begin(), by_shape_.end(), 0.0);
   for (size_t s = 0; s < shapes; ++s) by_shape_[(shape_unknown(model_) + s) * shapes + s] = 1;
   if (!solve_positive(damped_.data(), int(count), int(kMaxUnknowns), by_shape_.data(), int(shapes))) return false;
+  ShapeCovariance covariance{};
   for (size_t a = 0; a < shapes; ++a) {
     for (size_t b = 0; b < shapes; ++b) {
-      body.shape_covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
+      covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
     }
   }
-  return true;
+  return find_shape_for_sizes(shapes, body.pose.shape, covariance, body.size_shape);
 }
 
 FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before,
@@ -140,7 +141,7 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
   if (!std::isfinite(cost)) cost = from_starts(problem, body.pose, body.iterations);
   if (std::isfinite(cost)) describe(problem, body);
   const bool is_fitted = std::isfinite(cost) && body.inlier_fraction >= kMinInliers;
-  body.status = is_fitted && find_shape_covariance(problem, body) ? FitStatus::kFitted : FitStatus::kUnreliable;
+  body.status = is_fitted && find_size_shape(problem, body) ? FitStatus::kFitted : FitStatus::kUnreliable;
   if (body.status != FitStatus::kFitted) body.pose = mean_pose(model_);
   return body;
 }

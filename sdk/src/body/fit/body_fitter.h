@@ -23,8 +23,8 @@ struct FittedBody {
   double inlier_fraction = 0;  // of surface points: those that agree with the pose
   double error_px = 0;         // root mean square distance of the points that agree
   int iterations = 0;
-  uint32_t seen_joints = 0;            // bit j: pixels show bones of joint j; the other joints follow the prior
-  ShapeCovariance shape_covariance{};  // of this image alone, from the curvature of the cost; of kFitted
+  uint32_t seen_joints = 0;  // bit j: pixels show bones of joint j; the other joints follow the prior
+  SizeShape size_shape;      // of kFitted
 };
 
 struct FitSettings {
@@ -52,7 +52,7 @@ class BodyFitter {
   double from_starts(const FitProblem& problem, BodyPose& pose, int& taken);
   void describe(const FitProblem& problem, FittedBody& body);
   // False where the equations of `body.pose` are singular.
-  bool find_shape_covariance(FitProblem problem, FittedBody& body);
+  bool find_size_shape(FitProblem problem, FittedBody& body);
 
   const BodyModel& model_;
   const FitSettings settings_;

@@ -10,12 +10,23 @@ namespace maq::body {
 // Covariance of the shape coefficients after a fit, row by row at a stride of kMaxShapes.
 using ShapeCovariance = std::array<double, kMaxShapes * kMaxShapes>;
 
+// The shape that sizes are taken from. It is nearer to the average than the shape of the mesh, because the labels of an
+// image share their errors: clothes and the network make a whole person wider.
+struct SizeShape {
+  ShapeNumbers mean{};
+  ShapeCovariance covariance{};
+};
+
+// `fitted`: the shape of the best pose, and its covariance with a prior of variance 1. False where this is singular.
+bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const ShapeCovariance& covariance,
+                          SizeShape& shape);
+
 struct SizeEstimate {
   double value_m = 0, low_m = 0, high_m = 0;
 };
 
 // `height_m`: the true height of the person, to which the body was fitted; 0: unknown. With it, the height is exact.
-std::array<SizeEstimate, kSizes> estimate_sizes(const BodySizes& sizes, size_t shape_count, const ShapeNumbers& shape,
-                                                const ShapeCovariance& covariance, double height_m);
+std::array<SizeEstimate, kSizes> estimate_sizes(const BodySizes& sizes, size_t shape_count, const SizeShape& shape,
+                                                double height_m);
 
 }  // namespace maq::body

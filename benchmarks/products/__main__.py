@@ -1,7 +1,7 @@
 """Compares the SDK with MediaPipe on the same photographs and clips: quality, times, sizes.
 
     python -m benchmarks.products --only quality    20 minutes on two cores
-    python -m benchmarks.products --only times      40 minutes; nothing else may run
+    python -m benchmarks.products --only times      half an hour; nothing else may run
     python -m benchmarks.products --publish --only  writes docs/research/products.md from what is measured
 
 The first run installs MediaPipe into .data/products. Results: build/products/products.json, products.md, products.png.
@@ -21,13 +21,13 @@ from benchmarks import provenance
 from benchmarks.products import clips, figure, page, photographs, times
 from benchmarks.products.install import InstallError, install
 from benchmarks.products.protocol import ProductError
-from benchmarks.products.running import BUNDLE, Product, Running, cut_off, of_mediapipe, ours
+from benchmarks.products.running import BUNDLE, Product, cut_off, of_mediapipe, ours
 from export.evaluation.machine import describe_machine
 from export.people.clips.clip_file import ClipError, clip_paths
 from export.photos.packages import PackageError
 
 SCHEMA = "maquette-products-1"
-SECTIONS = ("quality", "times")
+QUALITY, SECTIONS = "quality", ("photographs", "clips", "times")
 JSON, PAGE = "products.json", "products.md"
 _DOCS, _IMAGES = Path("docs/research"), Path("docs/images")
 
@@ -36,8 +36,10 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.products", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--only", nargs="*", choices=SECTIONS, metavar="SECTION",
-                        help="measures quality or times again, or nothing; the other section is kept")  # fmt: skip
+    parser.add_argument(
+        "--only", nargs="*", choices=(QUALITY, *SECTIONS), metavar="SECTION",
+        help="quality, or a part of it: photographs, clips; times; or nothing. What is not measured again is kept.",
+    )  # fmt: skip
     parser.add_argument("--quick", action="store_true", help="a smoke test: few photographs and frames")
     parser.add_argument("--publish", action="store_true", help=f"copies page, figure and JSON to {_DOCS}")
     parser.add_argument("--data", type=Path, default=Path(".data"), metavar="DIR")
@@ -45,7 +47,8 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("build/products"), metavar="DIR")
     parser.add_argument("--rounds", type=int, default=4, help="of the times; default: 4")
     options = parser.parse_args(argv)
-    sections = SECTIONS if options.only is None else tuple(options.only)
+    asked = SECTIONS if options.only is None else options.only
+    sections = tuple(name for name in SECTIONS if name in asked or (QUALITY in asked and name != "times"))
     try:
         document = measured(_before(options.out / JSON), sections, options)
     except (ClipError, InstallError, MaquetteError, OSError, PackageError, ProductError, ValueError) as error:
@@ -63,48 +66,51 @@ def _before(path: Path) -> dict:
 
 
 def measured(document: dict, sections: tuple[str, ...], options: argparse.Namespace) -> dict:
-    """The document with these sections measured."""
+    """The document with these sections measured. Each is written to the disk at once."""
     if not sections:
         if not document:
             raise ValueError(f"nothing is measured: {options.out / JSON} is not there. Run without --only first.")
         return document
     products = [*ours(options.bundle.resolve()), *of_mediapipe(install(options.data / "products"))]
-    log = options.out / "log"
     document |= {"schema": SCHEMA, "machine": describe_machine(), "network_cut_off": bool(cut_off()),
-                 "products": _about(products, log)}  # fmt: skip
-    stamps = document.setdefault("provenance", {})
-    paths = [path for split in ("val", "test") for path in clip_paths(options.data / "people-clips" / split)]
-    if "quality" in sections:
-        with_masks = [product for product in products if product.has_masks]
-        chosen = photographs.Photographs.find(options.data, 3 if options.quick else None)
-        document["photographs"] = photographs.measure(with_masks, chosen, log)
-        document["clips"] = clips.measure(with_masks, paths, log, 8 if options.quick else None)
-        stamps["quality"] = provenance.stamp_of_code() | {"quick": options.quick}
+                 "products": {product.name: _about(product) for product in products}}  # fmt: skip
+    for section in sections:
+        document[section] = _MEASURES[section](products, options)
+        stamp = provenance.stamp_of_code() | {"quick": options.quick}
+        document.setdefault("provenance", {})[section] = stamp
         write(document, options.out)
-    if "times" in sections:
-        folder = options.data / "photos/test"
-        chosen = sorted(folder.glob("*.jpg"))
-        if not chosen:
-            raise ValueError(f"{folder} has no photographs. Fetch them: python -m export.photos fetch")
-        if options.quick:
-            document["times"] = times.measure(products, paths[:1], chosen[:2], log, 1, 1)
-        else:
-            document["times"] = times.measure(products, paths, chosen, log, options.rounds)
-        stamps["times"] = provenance.stamp_of_code() | {"quick": options.quick}
     return document
 
 
-def _about(products: list[Product], log: Path) -> dict[str, dict]:
-    """Name and version of each product, from its process."""
-    about = {}
-    for product in products:
-        with Running(product, 1, log / f"{product.name}.log") as process:
-            about[product.name] = {
-                "about": process.about,
-                "is_ours": product.is_ours,
-                "has_people": product.has_people,
-            }
-    return about
+def _about(product: Product) -> dict[str, object]:
+    return {"version": product.version, "is_ours": product.is_ours, "has_people": product.has_people}
+
+
+def _clip_paths(data: Path) -> list[Path]:
+    return [path for split in ("val", "test") for path in clip_paths(data / "people-clips" / split)]
+
+
+def _photographs(products: list[Product], options: argparse.Namespace) -> dict:
+    chosen = photographs.Photographs.find(options.data, 3 if options.quick else None)
+    return photographs.measure([own for own in products if own.has_masks], chosen, options.out / "log")
+
+
+def _clips(products: list[Product], options: argparse.Namespace) -> dict:
+    with_masks = [own for own in products if own.has_masks]
+    return clips.measure(with_masks, _clip_paths(options.data), options.out / "log", 8 if options.quick else None)
+
+
+def _times(products: list[Product], options: argparse.Namespace) -> dict:
+    folder, log, paths = options.data / "photos/test", options.out / "log", _clip_paths(options.data)
+    chosen = sorted(folder.glob("*.jpg"))
+    if not chosen:
+        raise ValueError(f"{folder} has no photographs. Fetch them: python -m export.photos fetch")
+    if options.quick:
+        return times.measure(products, paths[:1], chosen[:2], log, 1, 1)
+    return times.measure(products, paths, chosen, log, options.rounds)
+
+
+_MEASURES = {"photographs": _photographs, "clips": _clips, "times": _times}
 
 
 def write(document: dict, folder: Path) -> None:

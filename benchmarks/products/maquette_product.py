@@ -16,7 +16,6 @@ class MaquetteProduct:
 
     def __init__(self, preset: str, bundle: str, threads: int = 0) -> None:
         self._dense = maquette.DensePose(bundle, preset=preset, threads=threads, has_keypoints=1)
-        self.about = f"Maquette {maquette.__version__}"
 
     def start(self) -> None:
         self._dense.reset()

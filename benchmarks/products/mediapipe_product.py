@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-
 import mediapipe
 import numpy as np
 from mediapipe.tasks.python import BaseOptions, vision
@@ -36,7 +34,6 @@ class PoseLandmarker:
     are the defaults. Photographs run in the mode for images, frames in the mode for video."""
 
     def __init__(self, task: str, masks: bool, min_detection: float = 0.5) -> None:
-        self.about = f"MediaPipe {importlib.metadata.version('mediapipe')}"
         self._task, self._masks, self._min_detection = task, masks, min_detection
         self._still: vision.PoseLandmarker | None = None
         self._video: vision.PoseLandmarker | None = None
@@ -90,7 +87,6 @@ class SelfieSegmenter:
     """One mask of all people; it knows no persons."""
 
     def __init__(self, network: str) -> None:
-        self.about = f"MediaPipe {importlib.metadata.version('mediapipe')}"
         self._network = network
         self._still: vision.ImageSegmenter | None = None
         self._video: vision.ImageSegmenter | None = None

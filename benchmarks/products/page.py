@@ -12,9 +12,12 @@ FIGURE = "products.png"
 _HOW = """\
 ## How to read it
 
-- **Labels of the photographs** come from MediaPipe's heavy pose network, its selfie segmenter, and an SSD detector
-  (`export.teachers`). Rows with \\* are flattered for MediaPipe: it made these masks, landmarks and sides.
-  People whom MediaPipe could not label have no landmarks there.
+- **Labels of the photographs** come from other networks (`export.teachers`): boxes from an SSD detector; masks,
+  landmarks and sides from MediaPipe's heavy pose network and its selfie segmenter. Rows with \\* flatter MediaPipe: it
+  made these labels. People whom it could not label have no landmarks there.
+- *People found* in photographs flatters Maquette: its networks learnt from labels of the same detector, for other
+  photographs. None of these photographs was trained on. Settings of Maquette were chosen on the test set, none on the
+  fresh set.
 - **Clips are rendered**, so their truth is exact. They favour Maquette: its networks were trained on such renderings,
   of other bodies, clothes and motions.
 - *People whom all find*: the same people for all products, those whom each of them finds in that image. They are the
@@ -46,7 +49,7 @@ def page(document: dict) -> str:
     rows = rows_of(document)
     products = document["products"]
     machine = document["machine"]
-    versions = ", ".join(dict.fromkeys(own["about"] for own in products.values()))
+    versions = ", ".join(dict.fromkeys(own["version"] for own in products.values()))
     lines = [
         "# Maquette beside MediaPipe",
         "",

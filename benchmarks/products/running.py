@@ -8,13 +8,13 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import maquette
 import numpy as np
-from maquette import library_path
 
-from benchmarks.products.install import MediaPipe
+from benchmarks.products.install import MEDIAPIPE, MediaPipe
 from benchmarks.products.protocol import ProductError, receive, send
 from export.evaluation.backends import Prediction
 
@@ -28,13 +28,14 @@ _CUT_OFF = ("unshare", "--map-root-user", "--net")
 
 @dataclass(frozen=True)
 class Product:
-    """name: as in the table. adapter: "module:Class" (`worker.Adapter`). python: of its environment. networks, library:
-    files and folders whose size counts. is_ours. has_people: it finds single people, with joints. has_masks.
-    has_threads: its setting `threads` is the number of cores."""
+    """name: as in the table. adapter: "module:Class" (`worker.Adapter`). version: name and version of the package.
+    python: of its environment. networks, library: files and folders whose size counts. has_people: it finds single
+    people, with joints. has_masks. has_threads: its setting `threads` is the number of cores."""
 
     name: str
     adapter: str
     settings: dict[str, object]
+    version: str = ""
     python: Path = Path(sys.executable)
     networks: tuple[Path, ...] = ()
     library: tuple[Path, ...] = ()
@@ -49,13 +50,14 @@ class Product:
 
 def ours(bundle: Path = BUNDLE) -> list[Product]:
     """The two presets of the SDK."""
-    library = library_path().resolve()
+    library = maquette.library_path().resolve()
     runtime = sorted((library.parent / "maquette").glob("libonnxruntime*"))
     networks = tuple(sorted(path for path in bundle.iterdir() if path.suffix not in _DOCUMENTS))
     files = (library, *runtime, ROOT / "python/maquette")
     adapter = "benchmarks.products.maquette_product:MaquetteProduct"
     return [
-        Product(f"Maquette {preset}", adapter, {"preset": preset, "bundle": str(bundle)}, networks=networks,
+        Product(f"Maquette {preset}", adapter, {"preset": preset, "bundle": str(bundle)},
+                f"Maquette {maquette.__version__}", networks=networks,
                 library=files, is_ours=True, has_threads=True)
         for preset in ("stream", "photo")
     ]  # fmt: skip
@@ -65,12 +67,14 @@ def of_mediapipe(installed: MediaPipe) -> list[Product]:
     """The pose landmarker of three sizes, with masks and without; the heavy one with a lower threshold of the detector,
     which finds more people; and the selfie segmenter."""
 
+    version = f"MediaPipe {MEDIAPIPE}"
+
     def landmarker(name: str, size: str, has_masks: bool = True, **settings: object) -> Product:
         task = installed.tasks[size]
         return Product(
             f"MediaPipe {name}", "benchmarks.products.mediapipe_product:PoseLandmarker",
-            {"task": str(task), "masks": has_masks, **settings}, installed.python, (task,), (installed.package,),
-            has_masks=has_masks,
+            {"task": str(task), "masks": has_masks, **settings}, version, installed.python, (task,),
+            (installed.package,), has_masks=has_masks,
         )  # fmt: skip
 
     products = [landmarker(size, size) for size in installed.tasks]
@@ -78,7 +82,7 @@ def of_mediapipe(installed: MediaPipe) -> list[Product]:
     products += [landmarker(f"{size}{NO_MASKS}", size, has_masks=False) for size in installed.tasks]
     segmenter = Product(
         "MediaPipe selfie", "benchmarks.products.mediapipe_product:SelfieSegmenter",
-        {"network": str(installed.segmenter)}, installed.python, (installed.segmenter,), (installed.package,),
+        {"network": str(installed.segmenter)}, version, installed.python, (installed.segmenter,), (installed.package,),
         has_people=False,
     )  # fmt: skip
     return [*products, segmenter]
@@ -109,7 +113,6 @@ class Running:
     product: Product
     cores: int
     log: Path
-    about: str = field(init=False, default="")
 
     def __post_init__(self) -> None:
         product = self.product.on(self.cores)
@@ -123,7 +126,7 @@ class Running:
                 [*cut_off(), *command], cwd=ROOT, env={**os.environ, "PYTHONPATH": path}, stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=log, preexec_fn=lambda: _bind(self.cores),
             )  # fmt: skip
-        self.about = self._received()[0]["about"]
+        self._received()
 
     def ask(self, do: str, arrays: dict[str, np.ndarray] | None = None, **message: object) -> dict:
         return self._asked(do, arrays, message)[0]

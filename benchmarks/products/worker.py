@@ -11,6 +11,7 @@ import importlib
 import json
 import os
 import resource
+import socket
 import sys
 import time
 from pathlib import Path
@@ -22,9 +23,7 @@ from benchmarks.products.protocol import receive, send
 
 
 class Adapter(Protocol):
-    """A product. about: its name and version, for the report."""
-
-    about: str
+    """A product."""
 
     def start(self) -> None:
         """The next frame is the first one of another stream."""
@@ -88,7 +87,7 @@ class Worker:
         return {"ms": ms, "cpu_ms": cpu_ms, "people": self._adapter.count(result)}
 
     def _usage(self, _: dict) -> tuple[dict, dict]:
-        """Processor time and memory of the process so far, and its threads."""
+        """Processor time and memory of the process so far, its threads, and the network interfaces that it sees."""
         used = resource.getrusage(resource.RUSAGE_SELF)
         status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
         return {
@@ -96,13 +95,14 @@ class Worker:
             "rss_mb": int(status["VmRSS"].split()[0]) * 1024 / 1e6,
             "peak_rss_mb": int(status["VmHWM"].split()[0]) * 1024 / 1e6,
             "threads": int(status["Threads"]),
+            "interfaces": [name for _, name in socket.if_nameindex()],
         }, {}
 
 
 def serve(adapter: Adapter, messages: BinaryIO, answers: BinaryIO) -> None:
     """Answers until the messages end. A failure of the product is an answer, too."""
     worker = Worker(adapter)
-    send(answers, {"about": adapter.about})
+    send(answers, {"is_ready": True})
     while (given := receive(messages)) is not None:
         try:
             message, arrays = worker.answer(*given)

@@ -84,10 +84,10 @@ def test_messages_keep_values_and_arrays():
 def test_a_product_answers_from_its_own_process_without_a_network(tmp_path):
     if not cut_off():
         pytest.skip("this system does not allow a process without a network: unshare --net")
-    with Running(fake(tells_network=True), 1, tmp_path / "log") as process:
-        assert process.about == "lo"
+    with Running(fake(), 1, tmp_path / "log") as process:
         found = process.photo(painted(walkers(1)[0]))
         usage = process.ask("usage")
+    assert usage["interfaces"] == ["lo"]
     assert found.box.tolist() == walkers(1)[0].tolist()
     assert np.unique(found.inds).tolist() == [0, 1, 2]
     assert found.keypoint.shape == (2, COUNT, 3)
@@ -169,7 +169,7 @@ def test_photographs_are_scored_by_the_labels_of_the_set(tmp_path, capsys):
     image = painted(labels.box, photo_labels.SIZE, photo_labels.SIZE)
     cv2.imwrite(str(photos / "one.png"), image)
     cv2.imwrite(str(photos / "without-labels.png"), image)
-    cv2.imwrite(str(tmp_path / "photos/empty/plate.jpg"), image)  # whoever is found here is a false person
+    cv2.imwrite(str(tmp_path / "photos/empty/plate.jpg"), image)  # a person found here is a false one
     point = {name.replace(" ", "_"): keypoints_in(labels.box[0])[k] for k, name in enumerate(NAMES)}
     photo_labels.labels(**point).save(tmp_path / "runs/people/labels/one.npz")
     chosen = photographs.Photographs.find(tmp_path)

@@ -18,7 +18,7 @@ STAMP = {"commit": "0123456789ab", "date": "2026-11-29", "quick": False}
 
 def products():
     return {
-        name: {"about": f"{name} 1", "is_ours": name == "ours", "has_people": name != "segmenter"} for name in NAMES
+        name: {"version": f"{name} 1", "is_ours": name == "ours", "has_people": name != "segmenter"} for name in NAMES
     }
 
 
@@ -43,7 +43,7 @@ def document(**sections):
     }
     return {
         "schema": program.SCHEMA, "machine": {"processor": "A processor", "cores": 2}, "network_cut_off": True,
-        "products": products(), "provenance": {"quality": dict(STAMP), "times": dict(STAMP)}, **measured, **sections,
+        "products": products(), "provenance": {"clips": dict(STAMP), "times": dict(STAMP)}, **measured, **sections,
     }  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def test_only_measurements_of_one_commit_are_published(stamp, said, tmp_path, mo
     for name, folder in (("_DOCS", tmp_path / "docs"), ("_IMAGES", tmp_path / "images")):
         folder.mkdir()
         monkeypatch.setattr(program, name, folder)
-    shown = document(provenance={"quality": dict(STAMP), "times": stamp})
+    shown = document(provenance={"clips": dict(STAMP), "times": stamp})
     program.write(shown, tmp_path / "out")
     status = program.publish(shown, argparse.Namespace(out=tmp_path / "out"))
     files = sorted(path.name for name in ("docs", "images") for path in (tmp_path / name).iterdir())

@@ -3,7 +3,6 @@
 Person p, from 0, fills a rectangle with the value 80 * (p + 1). Keypoints lie in its box, in a fixed pattern.
 """
 
-import socket
 import time
 
 import numpy as np
@@ -35,11 +34,9 @@ def keypoints_in(box):
 
 class FakeProduct:
     """missed: people who are not found. swaps: ids of two people change in every frame. is_mirrored: left and right are
-    exchanged. fails: what happens on a photograph, "raise" or "exit". tells_network: `about` names
-    the network interfaces."""
+    exchanged. fails: what happens on a photograph, "raise" or "exit"."""
 
-    def __init__(self, missed=(), swaps=False, is_mirrored=False, fails="", tells_network=False):
-        self.about = " ".join(name for _, name in socket.if_nameindex()) if tells_network else "Fake 1.0"
+    def __init__(self, missed=(), swaps=False, is_mirrored=False, fails=""):
         self._missed, self._swaps, self._is_mirrored, self._fails = set(missed), swaps, is_mirrored, fails
         print("a product writes to stdout")
 

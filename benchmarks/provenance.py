@@ -21,6 +21,19 @@ def stamp() -> dict[str, str]:
     return {"commit": commit + (CHANGED if changed else ""), "date": date}
 
 
+def stamp_of_code() -> dict[str, str]:
+    """As `stamp`, of the last commit that changed anything outside docs, so that a page may be committed between two
+    measurements."""
+    found = stamp()
+    try:
+        found["commit"] = _git("log", "-1", "--abbrev=12", "--format=%h", "--", ".", ":(exclude)docs")
+        if _git("status", "--porcelain", "--untracked-files=no", "--", ".", ":(exclude)docs"):
+            found["commit"] += CHANGED
+    except (OSError, subprocess.CalledProcessError):
+        pass  # `stamp` has said "unknown"
+    return found
+
+
 def _git(*words: str) -> str:
     return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout.strip()
 

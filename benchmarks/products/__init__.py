@@ -1,0 +1,1 @@
+"""The SDK beside other products on the same photographs and clips."""

@@ -23,7 +23,7 @@ constexpr size_t kMaxAway = 32;
 constexpr float kMinIou = 0.1f, kNear = 0.5f;
 // How much the colours count beside the place, where both show the same parts of the body; and the difference from
 // which on it is somebody else.
-constexpr float kColourWeight = 1.5f, kOtherPerson = 0.5f;
+constexpr float kColourWeight = 1.3f, kOtherPerson = 0.6f;
 // A person who comes back: this share of the body tells, the colours differ by less, and from all others' by more.
 constexpr float kEnoughShared = 0.3f, kSameColours = 0.2f, kClearlyNearer = 0.05f;
 // The same after the person was seen for so long: the colours are surer then.

@@ -24,7 +24,7 @@ from pathlib import Path
 PAGE = Path(__file__).parent / "viewer.html"
 MAX_APART_M = 0.002
 CHROMIUM = ("chromium", "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-            "--hide-scrollbars", "--window-size=960,690", "--virtual-time-budget=20000")  # fmt: skip
+            "--hide-scrollbars", "--window-size=960,540", "--virtual-time-budget=20000")  # fmt: skip
 
 
 class Files(http.server.SimpleHTTPRequestHandler):

@@ -37,7 +37,7 @@ void require_sane(const BodyModel& model, const FittedBody& fitted) {
   for (const double part : fitted.size_shape.covariance) fuzz::require(std::isfinite(part), "a covariance without end");
 }
 
-// What a run of the C API does with a body.
+// Uses a body as a run of the C API does.
 void use_body(const BodyModel& model) {
   fuzz::Bytes labels(4 * Planes::kPixels);
   for (size_t i = 0; i < labels.size(); ++i) labels[i] = uint8_t(i < Planes::kPixels ? 1 + i / 3 % 24 : i * 37);

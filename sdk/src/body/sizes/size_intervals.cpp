@@ -17,7 +17,7 @@ constexpr double kSharedErrors = 4;
 
 // Standard deviation of the logarithm of a size, by that which follows from the fit. Measured on rendered people with
 // the shipped networks (export/evaluation/body_sizes.py), so that 90 % of true sizes are inside.
-constexpr Sizes kSpread = {1.0, 1.15, 1.1, 1.12, 1.05};
+constexpr Sizes kSpread = {1.05, 1.15, 1.1, 1.12, 1.1};
 
 }  // namespace
 

@@ -82,13 +82,20 @@ TEST(BodySizes, TheShapeOfSizesIsThatOfAStrongerPrior) {
   ShapeCovariance covariance{};
   covariance[0] = 1.0 / 4, covariance[kMaxShapes + 1] = 1;
   SizeShape shape;
-  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, shape));
+  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, 1, shape));
   EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12);
   EXPECT_NEAR(shape.mean[1], 0, 1e-12);
   EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12);
   EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12);  // as before any image
+  // The same image with half of its weight in the fit.
+  fitted[0] = 1.5 * 2 / (1.5 + 1);
+  covariance[0] = 1 / (1.5 + 1);
+  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, 0.5, shape));
+  EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12);
+  EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12);
+  EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12);
   covariance[0] = 0;
-  EXPECT_FALSE(find_shape_for_sizes(2, fitted, covariance, shape));
+  EXPECT_FALSE(find_shape_for_sizes(2, fitted, covariance, 1, shape));
 }
 
 // A tube of 1 m with a square section of 0.4 m, with an arm beside it.

@@ -34,7 +34,8 @@ void require_sane(const BodyModel& model, const FittedBody& fitted) {
   fuzz::require(is_finite(fitted.pose, model.joints.size()), "a pose that is not finite");
   for (const double shape : fitted.pose.shape) fuzz::require(std::abs(shape) <= 3, "a shape beyond its bounds");
   if (fitted.status != FitStatus::kFitted) return;
-  for (const double part : fitted.size_shape.covariance) fuzz::require(std::isfinite(part), "a covariance without end");
+  for (const double part : fitted.size_shape.covariance)
+    fuzz::require(std::isfinite(part), "a covariance that is not finite");
 }
 
 // Uses a body as a run of the C API does.
@@ -57,7 +58,7 @@ void use_body(const BodyModel& model) {
                       [&] { AngleJoints(model).angles_deg(bones_of(model, mean_pose(model))); });
   fuzz::run_or_refuse({MAQ_ERROR_BAD_BUNDLE}, [&] {
     for (const SizeEstimate& size : estimate_sizes(BodySizes(model), model.shape_count, SizeShape{}, 0)) {
-      fuzz::require(std::isfinite(size.value_m) && size.low_m <= size.high_m, "an interval that is none");
+      fuzz::require(std::isfinite(size.value_m) && size.low_m <= size.high_m, "an invalid interval");
     }
   });
 }

@@ -22,6 +22,7 @@ struct FittedBody {
   BodyPose pose;               // of kFitted; otherwise the mean pose
   double inlier_fraction = 0;  // of surface points: those that agree with the pose
   double error_px = 0;         // root mean square distance of the points that agree
+  double noise = 0;            // error_px by Observations::size_px
   int iterations = 0;
   uint32_t seen_joints = 0;  // bit j: pixels show bones of joint j; the other joints follow the prior
   SizeShape size_shape;      // of kFitted
@@ -36,6 +37,7 @@ struct FitSettings {
   int first_iterations = 6;        // of each start
   int iterations = 24;             // of the best start
   int warm_iterations = 8;
+  int noise_iterations = 6;  // after the noise of the labels was measured
 };
 
 class BodyFitter {
@@ -44,7 +46,9 @@ class BodyFitter {
   explicit BodyFitter(const BodyModel& model, const FitSettings& settings = {});
 
   // `before`: the pose in the frame before, null without one.
-  FittedBody fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before, const ShapePrior& shape);
+  // `noise`: FittedBody::noise of earlier frames. 0: unknown, so that it is measured by a first fit.
+  FittedBody fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before, const ShapePrior& shape,
+                 double noise = 0);
 
  private:
   // Improves `pose` and returns its cost; infinite without a step that can be taken.

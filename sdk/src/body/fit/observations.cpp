@@ -6,7 +6,7 @@
 namespace maq::body {
 namespace {
 
-constexpr double kKeypointWeight = 0.5;  // by the weight of a pixel of the surface
+constexpr double kKeypointWeight = 3;  // by the weight of a pixel of the surface
 
 // Sums points with weights of joints, until kPointJoints of these are kept.
 class PointSum {

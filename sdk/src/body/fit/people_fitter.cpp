@@ -10,6 +10,7 @@ constexpr int kSampledPixels = 220;
 constexpr int64_t kMinPixels = 100;
 constexpr double kMinConfidence = 0.15;
 constexpr double kMaxFrames = 30;        // of the running mean of a shape
+constexpr double kNoiseFrames = 8;       // of the running mean of the labels' noise
 constexpr double kPrecisionOfFrame = 1;  // that each frame adds to the prior of the shape
 
 }  // namespace
@@ -37,7 +38,8 @@ PeopleFitter::Track* PeopleFitter::find_track(int64_t id) {
   return found == tracks_.end() ? nullptr : &*found;
 }
 
-void PeopleFitter::keep(int64_t id, const BodyPose& pose) {
+void PeopleFitter::keep(int64_t id, const FittedBody& body) {
+  const BodyPose& pose = body.pose;
   Track* track = find_track(id);
   if (track == nullptr) {
     if (tracks_.size() == kMaxTracks) {
@@ -52,6 +54,7 @@ void PeopleFitter::keep(int64_t id, const BodyPose& pose) {
   track->is_perspective = camera_.is_perspective;
   track->seen_ns = now_ns_;
   track->frames = std::min(track->frames + 1, kMaxFrames);
+  track->noise += (body.noise - track->noise) / std::min(track->frames, kNoiseFrames);
   for (size_t s = 0; s < kMaxShapes; ++s) track->shape[s] += (pose.shape[s] - track->shape[s]) / track->frames;
 }
 
@@ -72,8 +75,8 @@ FittedBody PeopleFitter::fit(const PersonRequest& person) {
     before = track->pose;
   }
   shape.height_m = person.height_m;
-  body = fitter_.fit(seen_, camera_, is_warm ? &before : nullptr, shape);
-  if (body.status == FitStatus::kFitted && person.id != 0) keep(person.id, body.pose);
+  body = fitter_.fit(seen_, camera_, is_warm ? &before : nullptr, shape, is_warm ? track->noise : 0);
+  if (body.status == FitStatus::kFitted && person.id != 0) keep(person.id, body);
   return body;
 }
 

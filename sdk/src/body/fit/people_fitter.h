@@ -38,10 +38,10 @@ class PeopleFitter {
     BodyPose pose;
     bool is_perspective = false;
     std::array<double, kMaxShapes> shape{};  // running mean
-    double frames = 0;
+    double frames = 0, noise = 0;
   };
   Track* find_track(int64_t id);
-  void keep(int64_t id, const BodyPose& pose);
+  void keep(int64_t id, const FittedBody& body);
 
   const BodyModel& model_;
   BodyFitter fitter_;

@@ -22,7 +22,7 @@ constexpr Sizes kSpread = {1.05, 1.15, 1.1, 1.12, 1.1};
 }  // namespace
 
 bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const ShapeCovariance& covariance,
-                          SizeShape& shape) {
+                          double image_weight, SizeShape& shape) {
   const auto size = int(shape_count), stride = int(kMaxShapes);
   // Precision of image and prior together, and its product with the fitted shape, in which the prior has no part.
   ShapeCovariance factor = covariance, precision{};
@@ -32,18 +32,19 @@ bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const 
   for (size_t a = 0; a < shape_count; ++a) {
     for (size_t b = 0; b < shape_count; ++b) product[a] += precision[a * shape_count + b] * fitted[b];
   }
-  // The same image against a prior that weighs kSharedErrors times as much.
+  // The same image, without that weight, against a prior of kSharedErrors; all times the weight.
+  const double prior = kSharedErrors * image_weight;
   ShapeCovariance whole{};
   for (size_t a = 0; a < shape_count; ++a) {
     for (size_t b = 0; b < shape_count; ++b) {
-      whole[a * kMaxShapes + b] = precision[a * shape_count + b] + (a == b ? kSharedErrors - 1 : 0);
+      whole[a * kMaxShapes + b] = precision[a * shape_count + b] + (a == b ? prior - 1 : 0);
     }
   }
   factor = whole;
   if (!solve_positive(factor.data(), size, stride, product.data(), 1)) return false;
   shape.mean = product;
   ShapeCovariance inverse{};
-  for (size_t s = 0; s < shape_count; ++s) inverse[s * shape_count + s] = kSharedErrors;
+  for (size_t s = 0; s < shape_count; ++s) inverse[s * shape_count + s] = prior;
   if (!solve_positive(whole.data(), size, stride, inverse.data(), size)) return false;
   shape.covariance = {};
   for (size_t a = 0; a < shape_count; ++a) {

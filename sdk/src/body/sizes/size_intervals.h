@@ -17,9 +17,10 @@ struct SizeShape {
   ShapeCovariance covariance{};
 };
 
-// `fitted`: the shape of the best pose, and its covariance with a prior of variance 1. False where this is singular.
+// `fitted`: the shape of the best pose, and its covariance with a prior of variance 1. `image_weight`: by which the fit
+// multiplied the precision of the image. False where the covariance is singular.
 bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const ShapeCovariance& covariance,
-                          SizeShape& shape);
+                          double image_weight, SizeShape& shape);
 
 struct SizeEstimate {
   double value_m = 0, low_m = 0, high_m = 0;

@@ -99,17 +99,19 @@ void BodyFitter::describe(const FitProblem& problem, FittedBody& body) {
   for (size_t j = 0; j < model_.joints.size(); ++j) body.seen_joints |= seen[j] >= kSeenWeight ? 1u << j : 0u;
 }
 
-bool BodyFitter::find_size_shape(FitProblem problem, FittedBody& body) {
-  // Frames share their errors, so earlier ones do not count.
-  problem.shape.precision = 1;
-  if (!std::isfinite(equations_.linearize(problem, body.pose))) return false;
+bool BodyFitter::find_size_shape(const FitProblem& problem, FittedBody& body) {
   const size_t count = unknown_count(model_), shapes = model_.shape_count;
   for (size_t row = 0; row < count; ++row) {
     std::copy_n(equations_.matrix().data() + row * kMaxUnknowns, row + 1, damped_.data() + row * kMaxUnknowns);
     damped_[row * kMaxUnknowns + row] += 1e-12;
   }
   std::fill(by_shape_.begin(), by_shape_.end(), 0.0);
-  for (size_t s = 0; s < shapes; ++s) by_shape_[(shape_unknown(model_) + s) * shapes + s] = 1;
+  for (size_t s = 0; s < shapes; ++s) {
+    // Frames share their errors, so earlier ones do not count: only the prior of people does.
+    const size_t row = shape_unknown(model_) + s;
+    damped_[row * kMaxUnknowns + row] += 1 - problem.shape.precision;
+    by_shape_[row * shapes + s] = 1;
+  }
   if (!solve_positive(damped_.data(), int(count), int(kMaxUnknowns), by_shape_.data(), int(shapes))) return false;
   ShapeCovariance covariance{};
   for (size_t a = 0; a < shapes; ++a) {

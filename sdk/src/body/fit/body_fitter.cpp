@@ -113,14 +113,18 @@ bool BodyFitter::find_size_shape(const FitProblem& problem, FittedBody& body) {
     by_shape_[row * shapes + s] = 1;
   }
   if (!solve_positive(damped_.data(), int(count), int(kMaxUnknowns), by_shape_.data(), int(shapes))) return false;
-  ShapeCovariance covariance{};
+  FittedShape fitted;
   for (size_t a = 0; a < shapes; ++a) {
     for (size_t b = 0; b < shapes; ++b) {
-      covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
+      fitted.covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
     }
   }
   const double usual = std::min(1.0, settings_.independent_points / double(problem.seen->points.size()));
-  return find_shape_for_sizes(shapes, body.pose.shape, covariance, problem.data_weight / usual, body.size_shape);
+  fitted.image_weight = problem.data_weight / usual;
+  fitted.shape = body.pose.shape;
+  fitted.prior_mean = problem.shape.mean;
+  fitted.prior_precision = problem.shape.precision;
+  return find_shape_for_sizes(shapes, fitted, body.size_shape);
 }
 
 FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before,

@@ -178,6 +178,29 @@ TEST(BodySizes, AKnownHeightSetsTheScaleOfBodyAndPlace) {
   }
 }
 
+TEST(BodySizes, AHeightThatBecomesKnownInAStreamSetsTheScaleAtOnce) {
+  BodyPose truth = drawn_pose(3, 0.5, 0.3);
+  const ShapeLength height = height_of(model());
+  truth.shape[0] += (2.1 - height.of(truth.shape)) / height.by_shape_m[0];
+  for (const BodyCamera& camera : {kPinhole, BodyCamera{}}) {
+    truth.place = camera.is_perspective ? Vec3{0.2, 0, 3} : Vec3{320, 240, 5.3};
+    const Observations seen = observe(truth, camera);
+    BodyFitter fitter(model());
+    ShapePrior small;
+    small.height_m = 1.45;
+    FittedBody body = fitter.fit(seen, camera, nullptr, small);
+    ASSERT_EQ(body.status, FitStatus::kFitted);
+    ShapePrior tall;
+    tall.height_m = 2.1;
+    const BodyPose before = body.pose;
+    body = fitter.fit(seen, camera, &before, tall, body.noise);
+    ASSERT_EQ(body.status, FitStatus::kFitted);
+    EXPECT_LE(body.iterations, 8);
+    EXPECT_NEAR(height.of(body.pose.shape), 2.1, 0.01);
+    EXPECT_NEAR(body.pose.place.z, truth.place.z, 0.04 * truth.place.z);
+  }
+}
+
 TEST(BodySizes, WithoutAHeightTheIntervalsAreThoseOfAllPeople) {
   BodyPose truth = drawn_pose(3, 0.5, 0.3);
   truth.place = {0.2, 0, 3};

@@ -70,6 +70,7 @@ double BodyFitter::from_starts(const FitProblem& problem, BodyPose& pose, int& t
   for (const BodyPose& start : starts_.find(*problem.seen, problem.camera)) {
     BodyPose tried = start;
     tried.shape = problem.shape.mean;
+    equations_.give_height(problem.camera, problem.shape.height_m, tried);
     const double cost = improve(wide, settings_.first_iterations, tried, taken);
     if (cost < best) best = cost, pose = tried;
   }
@@ -149,6 +150,7 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
     problem.before = before;
     problem.before_precision = settings_.frame_precision;
     body.pose = *before;
+    equations_.give_height(camera, shape.height_m, body.pose);
     cost = improve(problem, settings_.warm_iterations, body.pose, body.iterations);
     if (std::isfinite(cost) && equations_.inlier_fraction() < kMinWarmInliers) cost = kInfinite;
     problem.before = nullptr;  // what follows is not near it

@@ -76,26 +76,30 @@ TEST(BodySizes, OfTheMeanBodyAreThoseOfAPerson) {
 }
 
 TEST(BodySizes, TheShapeOfSizesIsThatOfAStrongerPrior) {
-  // Two coefficients that an image tells with precisions 3 and 0, against a prior of 1.
-  ShapeNumbers fitted{};
-  fitted[0] = 1.5;  // 3 * 2 / (3 + 1)
-  ShapeCovariance covariance{};
-  covariance[0] = 1.0 / 4, covariance[kMaxShapes + 1] = 1;
+  // Two coefficients that an image tells with precisions 3 and 0, the first as 2, against a prior of 1.
+  const auto expect_right = [](const FittedShape& fitted, const char* what) {
+    SizeShape shape;
+    ASSERT_TRUE(find_shape_for_sizes(2, fitted, shape)) << what;
+    EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12) << what;
+    EXPECT_NEAR(shape.mean[1], 0, 1e-12) << what;
+    EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12) << what;
+    EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12) << what;  // as before any image
+  };
+  FittedShape fitted;
+  fitted.shape[0] = 3 * 2.0 / (3 + 1);
+  fitted.covariance[0] = 1.0 / (3 + 1), fitted.covariance[kMaxShapes + 1] = 1;
+  expect_right(fitted, "alone");
+  fitted.prior_mean = {0.7, -0.4};
+  fitted.prior_precision = 6;
+  fitted.shape[0] = (3 * 2.0 + 6 * 0.7) / (3 + 6), fitted.shape[1] = -0.4;
+  expect_right(fitted, "after other frames");
+  fitted.image_weight = 0.5;
+  fitted.shape[0] = (1.5 * 2 + 6 * 0.7) / (1.5 + 6);
+  fitted.covariance[0] = 1 / (1.5 + 1);
+  expect_right(fitted, "with half of its weight");
+  fitted.covariance[0] = 0;
   SizeShape shape;
-  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, 1, shape));
-  EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12);
-  EXPECT_NEAR(shape.mean[1], 0, 1e-12);
-  EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12);
-  EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12);  // as before any image
-  // The same image with half of its weight in the fit.
-  fitted[0] = 1.5 * 2 / (1.5 + 1);
-  covariance[0] = 1 / (1.5 + 1);
-  ASSERT_TRUE(find_shape_for_sizes(2, fitted, covariance, 0.5, shape));
-  EXPECT_NEAR(shape.mean[0], 3 * 2.0 / (3 + 4), 1e-12);
-  EXPECT_NEAR(shape.covariance[0], 4.0 / (3 + 4), 1e-12);
-  EXPECT_NEAR(shape.covariance[kMaxShapes + 1], 1, 1e-12);
-  covariance[0] = 0;
-  EXPECT_FALSE(find_shape_for_sizes(2, fitted, covariance, 1, shape));
+  EXPECT_FALSE(find_shape_for_sizes(2, fitted, shape));
 }
 
 // A tube of 1 m with a square section of 0.4 m, with an arm beside it.
@@ -171,6 +175,29 @@ TEST(BodySizes, AKnownHeightSetsTheScaleOfBodyAndPlace) {
       EXPECT_GT(sizes[k].high_m, true_sizes[k]) << height_m << " " << k;
       EXPECT_NEAR(sizes[k].value_m, true_sizes[k], 0.08 * true_sizes[k]) << height_m << " " << k;
     }
+  }
+}
+
+TEST(BodySizes, AHeightThatBecomesKnownInAStreamSetsTheScaleAtOnce) {
+  BodyPose truth = drawn_pose(3, 0.5, 0.3);
+  const ShapeLength height = height_of(model());
+  truth.shape[0] += (2.1 - height.of(truth.shape)) / height.by_shape_m[0];
+  for (const BodyCamera& camera : {kPinhole, BodyCamera{}}) {
+    truth.place = camera.is_perspective ? Vec3{0.2, 0, 3} : Vec3{320, 240, 5.3};
+    const Observations seen = observe(truth, camera);
+    BodyFitter fitter(model());
+    ShapePrior small;
+    small.height_m = 1.45;
+    FittedBody body = fitter.fit(seen, camera, nullptr, small);
+    ASSERT_EQ(body.status, FitStatus::kFitted);
+    ShapePrior tall;
+    tall.height_m = 2.1;
+    const BodyPose before = body.pose;
+    body = fitter.fit(seen, camera, &before, tall, body.noise);
+    ASSERT_EQ(body.status, FitStatus::kFitted);
+    EXPECT_LE(body.iterations, 8);
+    EXPECT_NEAR(height.of(body.pose.shape), 2.1, 0.01);
+    EXPECT_NEAR(body.pose.place.z, truth.place.z, 0.04 * truth.place.z);
   }
 }
 

@@ -70,6 +70,7 @@ double BodyFitter::from_starts(const FitProblem& problem, BodyPose& pose, int& t
   for (const BodyPose& start : starts_.find(*problem.seen, problem.camera)) {
     BodyPose tried = start;
     tried.shape = problem.shape.mean;
+    equations_.give_height(problem.camera, problem.shape.height_m, tried);
     const double cost = improve(wide, settings_.first_iterations, tried, taken);
     if (cost < best) best = cost, pose = tried;
   }
@@ -99,26 +100,32 @@ void BodyFitter::describe(const FitProblem& problem, FittedBody& body) {
   for (size_t j = 0; j < model_.joints.size(); ++j) body.seen_joints |= seen[j] >= kSeenWeight ? 1u << j : 0u;
 }
 
-bool BodyFitter::find_size_shape(FitProblem problem, FittedBody& body) {
-  // Frames share their errors, so earlier ones do not count.
-  problem.shape.precision = 1;
-  if (!std::isfinite(equations_.linearize(problem, body.pose))) return false;
+bool BodyFitter::find_size_shape(const FitProblem& problem, FittedBody& body) {
   const size_t count = unknown_count(model_), shapes = model_.shape_count;
   for (size_t row = 0; row < count; ++row) {
     std::copy_n(equations_.matrix().data() + row * kMaxUnknowns, row + 1, damped_.data() + row * kMaxUnknowns);
     damped_[row * kMaxUnknowns + row] += 1e-12;
   }
   std::fill(by_shape_.begin(), by_shape_.end(), 0.0);
-  for (size_t s = 0; s < shapes; ++s) by_shape_[(shape_unknown(model_) + s) * shapes + s] = 1;
+  for (size_t s = 0; s < shapes; ++s) {
+    // Frames share their errors, so earlier ones do not count: only the prior of people does.
+    const size_t row = shape_unknown(model_) + s;
+    damped_[row * kMaxUnknowns + row] += 1 - problem.shape.precision;
+    by_shape_[row * shapes + s] = 1;
+  }
   if (!solve_positive(damped_.data(), int(count), int(kMaxUnknowns), by_shape_.data(), int(shapes))) return false;
-  ShapeCovariance covariance{};
+  FittedShape fitted;
   for (size_t a = 0; a < shapes; ++a) {
     for (size_t b = 0; b < shapes; ++b) {
-      covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
+      fitted.covariance[a * kMaxShapes + b] = by_shape_[(shape_unknown(model_) + a) * shapes + b];
     }
   }
   const double usual = std::min(1.0, settings_.independent_points / double(problem.seen->points.size()));
-  return find_shape_for_sizes(shapes, body.pose.shape, covariance, problem.data_weight / usual, body.size_shape);
+  fitted.image_weight = problem.data_weight / usual;
+  fitted.shape = body.pose.shape;
+  fitted.prior_mean = problem.shape.mean;
+  fitted.prior_precision = problem.shape.precision;
+  return find_shape_for_sizes(shapes, fitted, body.size_shape);
 }
 
 FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, const BodyPose* before,
@@ -143,6 +150,7 @@ FittedBody BodyFitter::fit(const Observations& seen, const BodyCamera& camera, c
     problem.before = before;
     problem.before_precision = settings_.frame_precision;
     body.pose = *before;
+    equations_.give_height(camera, shape.height_m, body.pose);
     cost = improve(problem, settings_.warm_iterations, body.pose, body.iterations);
     if (std::isfinite(cost) && equations_.inlier_fraction() < kMinWarmInliers) cost = kInfinite;
     problem.before = nullptr;  // what follows is not near it

@@ -55,8 +55,8 @@ class BodyFitter {
   double improve(const FitProblem& problem, int iterations, BodyPose& pose, int& taken);
   double from_starts(const FitProblem& problem, BodyPose& pose, int& taken);
   void describe(const FitProblem& problem, FittedBody& body);
-  // False where the equations of `body.pose` are singular.
-  bool find_size_shape(FitProblem problem, FittedBody& body);
+  // After describe(). False where the equations of `body.pose` are singular.
+  bool find_size_shape(const FitProblem& problem, FittedBody& body);
 
   const BodyModel& model_;
   const FitSettings settings_;

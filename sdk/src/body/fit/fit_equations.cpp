@@ -195,6 +195,21 @@ double FitEquations::add_priors(const FitProblem& problem, const BodyPose& pose,
   return cost;
 }
 
+void FitEquations::give_height(const BodyCamera& camera, double height_m, BodyPose& pose) const {
+  const double before_m = height_.of(pose.shape);
+  double square = 0;
+  for (const double slope : height_.by_shape_m) square += slope * slope;
+  if (!(height_m > 0 && before_m > 0 && square > 0)) return;
+  for (size_t s = 0; s < model_.shape_count; ++s) {
+    pose.shape[s] += (height_m - before_m) * height_.by_shape_m[s] / square;
+  }
+  if (camera.is_perspective) {
+    pose.place = (height_m / before_m) * pose.place;
+  } else {
+    pose.place.z -= std::log(height_m / before_m);
+  }
+}
+
 double FitEquations::cost(const FitProblem& problem, const BodyPose& pose) {
   if (!is_finite(pose, model_.joints.size())) return kImpossible;
   bones_ = bones_of(model_, pose);

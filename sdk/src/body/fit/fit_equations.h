@@ -57,6 +57,9 @@ class FitEquations {
   // The same, and the equations of a small step: matrix() step = -gradient().
   double linearize(const FitProblem& problem, const BodyPose& pose);
 
+  // Changes shape and place of a pose, so that it has the height and looks as before. Without effect for 0.
+  void give_height(const BodyCamera& camera, double height_m, BodyPose& pose) const;
+
   // Rows of kMaxUnknowns; the lower triangle is set.
   const std::vector<double>& matrix() const { return matrix_; }
   const std::array<double, kMaxUnknowns>& gradient() const { return gradient_; }

@@ -21,19 +21,19 @@ constexpr Sizes kSpread = {1.05, 1.15, 1.1, 1.12, 1.1};
 
 }  // namespace
 
-bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const ShapeCovariance& covariance,
-                          double image_weight, SizeShape& shape) {
+bool find_shape_for_sizes(size_t shape_count, const FittedShape& fitted, SizeShape& shape) {
   const auto size = int(shape_count), stride = int(kMaxShapes);
   // Precision of image and prior together, and its product with the fitted shape, in which the prior has no part.
-  ShapeCovariance factor = covariance, precision{};
+  ShapeCovariance factor = fitted.covariance, precision{};
   for (size_t s = 0; s < shape_count; ++s) precision[s * shape_count + s] = 1;
   if (!solve_positive(factor.data(), size, stride, precision.data(), size)) return false;
   ShapeNumbers product{};
   for (size_t a = 0; a < shape_count; ++a) {
-    for (size_t b = 0; b < shape_count; ++b) product[a] += precision[a * shape_count + b] * fitted[b];
+    for (size_t b = 0; b < shape_count; ++b) product[a] += precision[a * shape_count + b] * fitted.shape[b];
+    product[a] += (fitted.prior_precision - 1) * fitted.shape[a] - fitted.prior_precision * fitted.prior_mean[a];
   }
   // The same image, without that weight, against a prior of kSharedErrors; all times the weight.
-  const double prior = kSharedErrors * image_weight;
+  const double prior = kSharedErrors * fitted.image_weight;
   ShapeCovariance whole{};
   for (size_t a = 0; a < shape_count; ++a) {
     for (size_t b = 0; b < shape_count; ++b) {

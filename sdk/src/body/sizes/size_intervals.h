@@ -17,10 +17,17 @@ struct SizeShape {
   ShapeCovariance covariance{};
 };
 
-// `fitted`: the shape of the best pose, and its covariance with a prior of variance 1. `image_weight`: by which the fit
-// multiplied the precision of the image. False where the covariance is singular.
-bool find_shape_for_sizes(size_t shape_count, const ShapeNumbers& fitted, const ShapeCovariance& covariance,
-                          double image_weight, SizeShape& shape);
+// The shape of the best pose of an image.
+struct FittedShape {
+  ShapeNumbers shape{};
+  ShapeNumbers prior_mean{};     // to which the fit drew it
+  double prior_precision = 1;    // with this precision
+  double image_weight = 1;       // by which the fit multiplied the precision of the image
+  ShapeCovariance covariance{};  // with a prior of precision 1, whatever prior_precision is
+};
+
+// False where the covariance is singular.
+bool find_shape_for_sizes(size_t shape_count, const FittedShape& fitted, SizeShape& shape);
 
 struct SizeEstimate {
   double value_m = 0, low_m = 0, high_m = 0;

@@ -204,8 +204,8 @@ def _box_pass(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, b
 
 @dataclass
 class Canvas:
-    """What people are painted into. iuv: uint8 [H, W, 3]. instance: uint8 [H, W], the person from 1. odds: int8 [H, W],
-    the log-odds of the painted person in eighths. painted: pixels of each person."""
+    """The image that people are painted into. iuv: uint8 [H, W, 3]. instance: uint8 [H, W], the person from 1. odds: int8
+    [H, W], the log-odds of the painted person in eighths. painted: pixels of each person."""
 
     iuv: np.ndarray
     instance: np.ndarray
@@ -228,7 +228,7 @@ def paint(maps: list[Tensor], box: list[float], number: int, canvas: Canvas, con
     are resized bilinearly with half-pixel centres.
 
     Where less than `config.min_visible_fraction` of the person's pixels is still empty, it writes none and returns 0.
-    Otherwise a pixel of another person goes to whoever has the higher log-odds there, unless the other person would
+    Otherwise a pixel of another person goes to the person with the higher log-odds there, unless the other person would
     keep less than that fraction of its pixels.
     """
     height, width = canvas.instance.shape

@@ -211,8 +211,9 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
   command->add_option("-o,--out", options->out, "Folder for the results; created if needed")->required();
   command->add_flag("--overlay", options->overlay,
                     "Also draw parts, U/V contours and boxes: <stem>_overlay.png, for clips <stem>_overlay.mp4");
-  command->add_flag("--textures", options->textures,
-                    "Also write the colours of each person on the body surface: <stem>_person<id>_texture.png");
+  command->add_flag(
+      "--textures", options->textures,
+      "Also write the colours of each person on the body surface, of all frames: <stem>_person<id>_texture.png");
   command
       ->add_option(
           "--colours", options->colours,
@@ -233,7 +234,6 @@ void add_densepose_command(CLI::App& app, int* exit_code) {
       "  <stem>_IUV.png   body part I, U * 255, V * 255 (channels B, G, R of the file)\n"
       "  <stem>_INDS.png  index of the person a pixel belongs to, from 1; 0: background\n"
       "  <stem>.json      boxes in pixels, scores, ids; with --keypoints also keypoints: x, y, confidence\n"
-      "--textures writes the 24 charts of a person in 4 columns of 6, of all frames of a clip; alpha is the confidence.\n"
       "Frames of a clip are named <stem>_<frame number>. Files are written atomically.\n\n"
       "Examples:\n"
       "  maquette densepose photo.jpg --out results --overlay\n"

@@ -21,7 +21,7 @@ FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 SCENE = SEEN | {"scene/assembly", "scene/render"}
 DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/keypoints", "densepose/surface",
-             "densepose/tracking"}  # fmt: skip
+             "densepose/texture", "densepose/tracking"}  # fmt: skip
 CURVES = {"edges", "edges/curves"}
 HEAD = {"head", "head/camera", "head/field", "head/fit", "head/mesh", "head/texture", "head/registration"}
 SYSTEMS = (
@@ -50,6 +50,7 @@ MAY_INCLUDE = {
     "densepose/bundle": BASE,
     "densepose/detector": BASE | {"core/trace", "densepose/bundle"},
     "densepose/surface": BASE | {"densepose/bundle", "densepose/detector"},
+    "densepose/texture": BASE | {"densepose/surface"},
     "densepose/tracking": BASE | {"densepose/detector", "densepose/surface"},
     "densepose/keypoints": BASE | {"densepose/bundle"},
     "densepose/crops": BASE | DENSEPOSE - {"densepose/crops", "densepose/keypoints", "densepose/tracking"},

@@ -7,7 +7,7 @@
 namespace maq {
 namespace {
 
-constexpr float kStep = 1.0f / 255;  // of U and V in the planes
+constexpr float kByteStep = 1.0f / 255;  // of U and V in the planes
 constexpr float kRounding = 1e-6f;
 
 // Calls `visit` with x, y and the distance of each pixel of the person that shows the part.
@@ -18,7 +18,7 @@ void for_each_pixel(const DensePlanes& planes, uint8_t person, int part, float u
     for (int x = 0; x < planes.width_px; ++x) {
       const size_t at = row + size_t(x);
       if (planes.person[at] != person || planes.part[at] != part) continue;
-      visit(x, y, std::hypot(float(planes.u[at]) * kStep - u, float(planes.v[at]) * kStep - v));
+      visit(x, y, std::hypot(float(planes.u[at]) * kByteStep - u, float(planes.v[at]) * kByteStep - v));
     }
   }
 }

@@ -9,19 +9,19 @@ namespace maq {
 namespace {
 
 // Pixels after which the confidence of a texel is one half.
-constexpr float kEnough = 2;
+constexpr float kEnoughWeight = 2;
 // Older pixels count less after so many, so that the texture follows a change of light.
 constexpr float kMaxWeight = 60;
-constexpr float kLeastWeight = 0.05f;  // less than this was not seen
+constexpr float kMinWeight = 0.05f;  // less than this was not seen
 // Width of the outline that is left out, in pixels, for a person of kTallPx and for all others.
 constexpr int kOutlinePx = 1, kTallOutlinePx = 2, kTallPx = 300;
 
-struct Bounds {
+struct PersonBounds {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-Bounds bounds_of(const DensePlanes& planes, uint8_t person) {
-  Bounds bounds{planes.width_px, planes.height_px, 0, 0};
+PersonBounds bounds_of(const DensePlanes& planes, uint8_t person) {
+  PersonBounds bounds{planes.width_px, planes.height_px, 0, 0};
   for (int y = 0; y < planes.height_px; ++y) {
     const uint8_t* const row = planes.person.data() + size_t(y) * size_t(planes.width_px);
     for (int x = 0; x < planes.width_px; ++x) {
@@ -81,7 +81,7 @@ void fill(Level& fine, Level& coarse) {
   }
 }
 
-uint8_t rounded(float value) { return uint8_t(std::lround(std::clamp(value, 0.0f, 255.0f))); }
+uint8_t as_byte(float value) { return uint8_t(std::lround(std::clamp(value, 0.0f, 255.0f))); }
 
 }  // namespace
 
@@ -89,7 +89,7 @@ SurfaceTexture::SurfaceTexture(int tile_px)
     : tile_px_(tile_px), texels_(size_t(kParts) * size_t(tile_px) * size_t(tile_px)) {}
 
 int64_t SurfaceTexture::add(const ImageView& image, const DensePlanes& planes, uint8_t person) {
-  const Bounds bounds = bounds_of(planes, person);
+  const PersonBounds bounds = bounds_of(planes, person);
   if (bounds.x1 <= bounds.x0) return 0;
   const int left = bounds.x0 / 2 * 2, top = bounds.y0 / 2 * 2;  // of YUV images two pixels share their colour
   const ImageView bgr = as_bgr(window_of(image, left, top, bounds.x1 - left, bounds.y1 - top), memory_);
@@ -134,7 +134,7 @@ bool SurfaceTexture::filled_tile(const Texel* tile, std::vector<float>& colours)
   bool is_seen = false;
   for (size_t i = 0; i < size_t(tile_px_) * size_t(tile_px_); ++i) {
     const float weight = std::min(1.0f, tile[i].weight);
-    if (weight < kLeastWeight) continue;
+    if (weight < kMinWeight) continue;
     is_seen = true;
     for (size_t c = 0; c < 3; ++c) levels[0].values[4 * i + c] = weight * tile[i].colour[c];
     levels[0].values[4 * i + 3] = weight;
@@ -160,16 +160,16 @@ void SurfaceTexture::draw(uint8_t* rgba, size_t stride_bytes) const {
     uint8_t* const corner = rgba + part % size_t(kRows) * side * stride_bytes + 4 * (part / size_t(kRows) * side);
     for (size_t i = 0; i < side * side; ++i) {
       uint8_t* const to = corner + i / side * stride_bytes + 4 * (i % side);
-      for (size_t c = 0; c < 3; ++c) to[c] = rounded(colours[3 * i + c]);
+      for (size_t c = 0; c < 3; ++c) to[c] = as_byte(colours[3 * i + c]);
       const float weight = tile[i].weight;
-      to[3] = weight < kLeastWeight ? uint8_t(0) : rounded(255 * weight / (weight + kEnough));
+      to[3] = weight < kMinWeight ? uint8_t(0) : as_byte(255 * weight / (weight + kEnoughWeight));
     }
   }
 }
 
 double SurfaceTexture::seen_fraction() const {
   const auto seen =
-      std::count_if(texels_.begin(), texels_.end(), [](const Texel& t) { return t.weight >= kLeastWeight; });
+      std::count_if(texels_.begin(), texels_.end(), [](const Texel& t) { return t.weight >= kMinWeight; });
   return double(seen) / double(texels_.size());
 }
 

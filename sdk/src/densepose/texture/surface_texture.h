@@ -27,7 +27,7 @@ class SurfaceTexture {
   // depth image.
   int64_t add(const ImageView& image, const DensePlanes& planes, uint8_t person);
 
-  // Writes height_px() rows of RGBA. Alpha is the confidence: 0 where no pixel was seen, 128 after kEnough pixels, at
+  // Writes height_px() rows of RGBA. Alpha is the confidence: 0 where no pixel was seen, 128 after two pixels, at
   // most 255. Texels that were not seen have the colours of the texels around them.
   void draw(uint8_t* rgba, size_t stride_bytes) const;
 

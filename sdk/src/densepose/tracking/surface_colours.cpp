@@ -9,9 +9,9 @@ namespace {
 // Pixels that are read of each frame, about.
 constexpr double kReadPixels = 20000;
 
-constexpr size_t kParts = 24;
+constexpr size_t kColouredParts = 24;
 enum RegionName { kTorso, kHands, kFeet, kUpperLegs, kLowerLegs, kUpperArms, kLowerArms, kHead };
-constexpr std::array<RegionName, kParts> kRegionOfPart = {
+constexpr std::array<RegionName, kColouredParts> kRegionOfPart = {
     kTorso,     kTorso,     kHands,     kHands,     kFeet,      kFeet,      kUpperLegs, kUpperLegs,
     kUpperLegs, kUpperLegs, kLowerLegs, kLowerLegs, kLowerLegs, kLowerLegs, kUpperArms, kUpperArms,
     kUpperArms, kUpperArms, kLowerArms, kLowerArms, kLowerArms, kLowerArms, kHead,      kHead};
@@ -102,7 +102,7 @@ void read_colours(const ImageView& image, const DensePlanes& planes, size_t peop
     for (int x = step / 2; x < planes.width_px; x += step) {
       const size_t pixel = row + size_t(x);
       const size_t person = planes.person[pixel], part = planes.part[pixel];
-      if (person == 0 || person > people || part == 0 || part > kParts) continue;
+      if (person == 0 || person > people || part == 0 || part > kColouredParts) continue;
       Region& sum = colours[person - 1].regions[size_t(kRegionOfPart[part - 1])];
       const std::array<float, 3> colour = colour_at(image, x, y);
       for (size_t c = 0; c < 3; ++c) sum.colour[c] += colour[c];

@@ -244,6 +244,8 @@ maq_status maq_body_result_get_person(const maq_body_result* result, uint32_t in
 maq_status maq_body_result_get_sizes(const maq_body_result* result, uint32_t index, maq_body_sizes* sizes) {
   return guarded(result, __func__, [&] {
     require_argument(result, "result");
+    require_argument(sizes, "sizes");
+    require_struct_size("sizes", sizes->struct_size, sizeof(maq_body_sizes));
     require_index("index", index, result->count);
     const BodyOfPerson& person = result->people[index];
     if (person.fitted.status != body::FitStatus::kFitted) {

@@ -34,6 +34,23 @@ def stamp_of_code() -> dict[str, str]:
     return found
 
 
+def library_refusal(commit: str) -> str:
+    """Returns one sentence that says why a library of this commit is not the one of this tree, or "" if its sources are
+    the same. The commit of a library with changed files ends with "+"."""
+    again = "Build it again: make build"
+    if commit.endswith("+"):
+        return f"The library was built from commit {commit[:-1]} with uncommitted changes. {again}"
+    try:
+        differs = _git("diff", "--name-only", commit, "HEAD", "--", "sdk", "cmake", "CMakeLists.txt")
+    except (OSError, subprocess.CalledProcessError):
+        return f"The library is of commit {commit}, which this checkout does not have. {again}"
+    return (
+        f"The library is of commit {commit}, whose sources differ from those of this checkout. {again}"
+        if differs
+        else ""
+    )
+
+
 def _git(*words: str) -> str:
     return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout.strip()
 

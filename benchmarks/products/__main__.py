@@ -15,7 +15,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from maquette import MaquetteError
+import maquette
 
 from benchmarks import provenance
 from benchmarks.products import clips, figure, page, photographs, times
@@ -51,7 +51,7 @@ def main(argv: list[str] | None = None) -> int:
     sections = tuple(name for name in SECTIONS if name in asked or (QUALITY in asked and name != "times"))
     try:
         document = measured(_before(options.out / JSON), sections, options)
-    except (ClipError, InstallError, MaquetteError, OSError, PackageError, ProductError, ValueError) as error:
+    except (ClipError, InstallError, maquette.MaquetteError, OSError, PackageError, ProductError, ValueError) as error:
         print(f"The comparison stopped: {error}", file=sys.stderr)
         return 1
     write(document, options.out)
@@ -74,9 +74,12 @@ def measured(document: dict, sections: tuple[str, ...], options: argparse.Namesp
     products = [*ours(options.bundle.resolve()), *of_mediapipe(install(options.data / "products"))]
     document |= {"schema": SCHEMA, "machine": describe_machine(), "network_cut_off": bool(cut_off()),
                  "products": {product.name: _about(product) for product in products}}  # fmt: skip
+    library = maquette.build_info()["git_commit"]
+    if differs := provenance.library_refusal(library):
+        print(f"This run cannot be published. {differs}", file=sys.stderr)
     for section in sections:
         document[section] = _MEASURES[section](products, options)
-        stamp = provenance.stamp_of_code() | {"quick": options.quick}
+        stamp = provenance.stamp_of_code() | {"quick": options.quick, "library": library}
         document.setdefault("provenance", {})[section] = stamp
         write(document, options.out)
     return document
@@ -126,6 +129,8 @@ def publish(document: dict, options: argparse.Namespace) -> int:
     refused = provenance.refusal(stamps, stamps, "python -m benchmarks.products --only")
     if not refused and any(stamp["quick"] for stamp in stamps.values()):
         refused = "A run with --quick is not published. Measure without it."
+    libraries = {stamp["library"] for stamp in stamps.values()}
+    refused = refused or next(filter(None, map(provenance.library_refusal, sorted(libraries))), "")
     if refused:
         print(refused, file=sys.stderr)
         return 1

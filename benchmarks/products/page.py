@@ -50,10 +50,12 @@ def page(document: dict) -> str:
     products = document["products"]
     machine = document["machine"]
     versions = ", ".join(dict.fromkeys(own["version"] for own in products.values()))
+    library = ", ".join(sorted({stamp["library"] for stamp in document["provenance"].values()}))
     lines = [
         "# Maquette beside MediaPipe",
         "",
         f"Written by `{COMMAND} --publish`. {provenance.sentence(document['provenance'])}",
+        f"The library was built from commit {library}.",
         f"{versions}. {machine['processor']}, {machine['cores']} cores.",
         "",
         *_data(document),

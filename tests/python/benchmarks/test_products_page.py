@@ -13,7 +13,7 @@ from benchmarks.products.rows import FOREGROUND, Row, losses, rows_of
 from benchmarks.products.running import NO_MASKS
 
 NAMES = ("ours", "theirs", f"theirs{NO_MASKS}", "segmenter")
-STAMP = {"commit": "0123456789ab", "date": "2026-11-29", "quick": False}
+STAMP = {"commit": "0123456789ab", "date": "2026-11-29", "quick": False, "library": "aaaaaaaaaaaa"}
 
 
 def products():
@@ -127,11 +127,13 @@ def test_the_figure_has_each_product_with_error_and_time(tmp_path):
         (STAMP, ""),
         (STAMP | {"quick": True}, "--quick"),
         (STAMP | {"commit": "fedcba987654"}, "different commits"),
+        (STAMP | {"library": "bbbbbbbbbbbb"}, "Build it"),
         (STAMP | {"commit": STAMP["commit"] + provenance.CHANGED}, "with uncommitted changes"),
     ],
-    ids=["one commit", "quick", "other commit", "uncommitted changes"],
+    ids=["one commit", "quick", "other commit", "another library", "uncommitted changes"],
 )
 def test_only_measurements_of_one_commit_are_published(stamp, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(provenance, "library_refusal", lambda commit: "Build it" if commit == "bbbbbbbbbbbb" else "")
     for name, folder in (("_DOCS", tmp_path / "docs"), ("_IMAGES", tmp_path / "images")):
         folder.mkdir()
         monkeypatch.setattr(program, name, folder)
@@ -155,12 +157,15 @@ def test_the_other_section_of_an_earlier_run_is_kept(tmp_path, capsys):
     assert "nothing is measured" in capsys.readouterr().err
 
 
-def test_a_stamp_of_code_ignores_changes_of_docs(tmp_path, monkeypatch):
+@pytest.fixture
+def commit(tmp_path, monkeypatch):
+    """Commits a file to a new repository, which is the current folder, and returns the stamp's commit."""
+
     def git(*words):
         subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@b", *words], cwd=tmp_path, check=True,
                        capture_output=True)  # fmt: skip
 
-    def commit(name):
+    def commit_file(name):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(name)
         git("add", "-A")
@@ -169,6 +174,10 @@ def test_a_stamp_of_code_ignores_changes_of_docs(tmp_path, monkeypatch):
 
     git("init", "-q")
     monkeypatch.chdir(tmp_path)
+    return commit_file
+
+
+def test_a_stamp_of_code_ignores_changes_of_docs(commit, tmp_path):
     code = commit("code.py")
     assert len(code) == 12
     assert commit("docs/page.md") == code
@@ -177,3 +186,14 @@ def test_a_stamp_of_code_ignores_changes_of_docs(tmp_path, monkeypatch):
     (tmp_path / "code.py").write_text("other")
     assert provenance.stamp_of_code()["commit"] == code + provenance.CHANGED
     assert commit("other.py") not in (code, code + provenance.CHANGED)
+
+
+def test_a_library_of_other_sources_is_refused(commit):
+    library = commit("sdk/a.cpp")
+    assert provenance.library_refusal(library) == ""
+    assert "uncommitted changes" in provenance.library_refusal(f"{library}+")
+    commit("benchmarks/b.py")
+    assert provenance.library_refusal(library) == ""
+    commit("sdk/c.cpp")
+    assert "differ" in provenance.library_refusal(library)
+    assert "does not have" in provenance.library_refusal("0123456789ab")

@@ -204,8 +204,8 @@ def _box_pass(graphs: Graphs, features: list[Tensor], evidence: Tensor | None, b
 
 @dataclass
 class Canvas:
-    """The image that people are painted into. iuv: uint8 [H, W, 3]. instance: uint8 [H, W], the person from 1. odds: int8
-    [H, W], the log-odds of the painted person in eighths. painted: pixels of each person."""
+    """The image that people are painted into. iuv: uint8 [H, W, 3]. instance: uint8 [H, W], the person from 1. odds:
+    int8 [H, W], the log-odds of the painted person in eighths. painted: pixels of each person."""
 
     iuv: np.ndarray
     instance: np.ndarray

@@ -81,7 +81,7 @@ _CLIPS = [
     (FOREGROUND, "foreground_iou", 1, 3, False),
     ("limb joints within 0.1 torsos, missed people are wrong", "joints", 1, 3, False),
     ("limb joints within 0.1 torsos, people whom all find", "common_joints", 1, 3, False),
-    ("shoulders and hips within 0.1 torsos, people whom all find", "common_torso_joints", 0, 3, False),
+    ("shoulders and hips within 0.1 torsos, people whom all find", "common_torso_joints", 1, 3, False),
     ("left and right, people whom all find", "common_left_right", 1, 3, False),
     ("jitter of joints, % of the torso a frame, median", "joint_jitter_p50", -1, 2, False),
     ("jitter of joints, 90th percentile", "joint_jitter_p90", -1, 2, False),

@@ -1,7 +1,6 @@
 // A surface that does not flicker: in a stream, the answers of the dense head are averaged along the motion of people.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "densepose/surface/dense_decode.h"
@@ -29,7 +28,6 @@ class SteadySurface {
     AffineMap to_cells;
     int size = 0;
     std::vector<float> labels, surface;
-    std::vector<float> odds;  // of a person, by cell, row by row
   };
   // The answer of the frame before for a cell: a weighted mean of four values that lie at `from`. `share`: how much it
   // counts.
@@ -47,8 +45,6 @@ class SteadySurface {
   std::vector<Answer> previous_, current_;  // memory is reused: the first so many count
   size_t previous_count_ = 0, current_count_ = 0;
   std::vector<Source> of_labels_, of_surface_;  // by cell of the labels and of the surface
-  std::vector<float> odds_;                     // of the new answer
-  std::vector<uint8_t> is_shown_;               // by cell of the surface: a label of it is not background
 };
 
 }  // namespace maq

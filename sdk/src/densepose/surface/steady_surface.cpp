@@ -12,12 +12,23 @@ namespace {
 constexpr double kSimilarView = 0.3;
 // Changes at which the frame before counts half: of the log-odds of a person, and of brightness (0 to 255).
 constexpr float kOtherOdds = 3, kOtherBrightness = 8;
+// Cells with lower log-odds of a person are background, whatever they were before.
+constexpr float kBackgroundOdds = -3;
 
 float half_at(float change, float limit) { return 1 / (1 + (change / limit) * (change / limit)); }
 
-// About the log-odds that a cell shows a person.
-float person_odds(const float* cell, int coarse_classes) {
-  return *std::max_element(cell + 1, cell + coarse_classes) - cell[0];
+// Computes about the log-odds that a cell shows a person, for each cell: row by row, NaN where a logit is NaN.
+MAQ_SIMD_CLONES void find_odds(const DenseLogits& logits, std::vector<float>& odds) {
+  odds.resize(size_t(logits.size) * size_t(logits.size));
+  float* to = odds.data();
+  for (int row = 0; row < logits.size; ++row) {
+    for (int column = 0; column < logits.size; ++column) {
+      const float* const cell = logits.cell(row, column);
+      float best = cell[1];
+      for (int c = 2; c < logits.coarse_classes; ++c) best = cell[c] > best ? cell[c] : best;
+      *to++ = best - cell[0];
+    }
+  }
 }
 
 // Between which cells of a square of `size` a place lies, x first; nothing outside.
@@ -93,12 +104,16 @@ void SteadySurface::find_sources(const AffineMap& to_cells, const DenseLogits& l
   const size_t channels = before.surface.size() / (size_t(half) * size_t(half));
   of_labels_.resize(size_t(size) * size_t(size));
   of_surface_.assign(size_t(half) * size_t(half), {});
+  is_placed_.assign(of_surface_.size(), 0);
+  find_odds(logits, odds_);
   for (int row = 0; row < size; ++row) {
     for (int column = 0; column < size; ++column) {
       const float* const cell = logits.cell(row, column);
       const size_t classes = size_t(logits.coarse_classes + logits.index_classes);
       Source& source = of_labels_[size_t(cell - logits.labels) / classes];
       source = {};
+      const float odds_now = odds_[size_t(row) * size_t(size) + size_t(column)];
+      if (odds_now < kBackgroundOdds) continue;
       const Point image = to_image({column + 0.5, row + 0.5});
       const FrameMotion::Motion& motion = motion_.at(image);
       const Point was = before.to_cells({image.x - double(motion.x_px), image.y - double(motion.y_px)});
@@ -106,28 +121,31 @@ void SteadySurface::find_sources(const AffineMap& to_cells, const DenseLogits& l
       if (!cells.is_inside) continue;
       float odds = 0;
       for (int k = 0; k < 4; ++k) {
-        const float* const from = old.cell(cells.row + k / 2, cells.column + k % 2);
-        source.from[k] = size_t(from - old.labels);
+        const int from_row = cells.row + k / 2, from_column = cells.column + k % 2;
+        source.from[k] = size_t(old.cell(from_row, from_column) - old.labels);
         source.weights[k] = cells.weights[k];
-        odds += cells.weights[k] * person_odds(from, logits.coarse_classes);
+        odds += cells.weights[k] * before.odds[size_t(from_row) * size_t(size) + size_t(from_column)];
       }
-      const float share = steadiness_ * half_at(motion.mismatch, kOtherBrightness) *
-                          half_at(odds - person_odds(cell, logits.coarse_classes), kOtherOdds);
-      source.share = share > 0 ? share : 0;  // also where it is NaN
+      const float likeness = half_at(motion.mismatch, kOtherBrightness) * half_at(odds - odds_now, kOtherOdds);
+      source.share = likeness > 0 ? steadiness_ * likeness : 0;  // 0 also where it is NaN
       // A cell of the surface covers four of the labels: the least share of them, at the place of the first.
-      Source& coarse = of_surface_[size_t(row / 2) * size_t(half) + size_t(column / 2)];
-      if (row % 2 == 0 && column % 2 == 0) {
-        const double shift_x = was.x - (column + 0.5), shift_y = was.y - (row + 0.5);
-        const Between places = between_cells((column + 1 + shift_x) / 2, (row + 1 + shift_y) / 2, half);
-        if (!places.is_inside) continue;
-        for (int k = 0; k < 4; ++k) {
-          coarse.from[k] = (size_t(places.row + k / 2) * size_t(half) + size_t(places.column + k % 2)) * channels;
-          coarse.weights[k] = places.weights[k];
-        }
-        coarse.share = source.share;
-      } else {
+      const size_t four = size_t(row / 2) * size_t(half) + size_t(column / 2);
+      Source& coarse = of_surface_[four];
+      if (is_placed_[four] != 0) {
         coarse.share = std::min(coarse.share, source.share);
+        continue;
       }
+      is_placed_[four] = 1;
+      const double shift_x = was.x - (column + 0.5), shift_y = was.y - (row + 0.5);
+      const Between places = between_cells((column / 2 * 2 + 1 + shift_x) / 2, (row / 2 * 2 + 1 + shift_y) / 2, half);
+      bool is_known = places.is_inside;
+      for (int k = 0; is_known && k < 4; ++k) {
+        const size_t from = size_t(places.row + k / 2) * size_t(half) + size_t(places.column + k % 2);
+        is_known = before.is_shown[from] != 0;
+        coarse.from[k] = from * channels;
+        coarse.weights[k] = places.weights[k];
+      }
+      coarse.share = is_known ? source.share : 0;
     }
   }
 }
@@ -148,7 +166,23 @@ void SteadySurface::steady(const AffineMap& to_cells, const DenseLogits& logits,
   kept.to_cells = to_cells;
   kept.size = logits.size;
   kept.labels.assign(labels, labels + cells * size_t(classes));
-  kept.surface.assign(surface, surface + cells / 4 * size_t(channels));
+  find_odds(logits, kept.odds);
+  keep_surface(surface, size_t(channels), kept);
+}
+
+// The features are most of an answer, and most of them are of background.
+void SteadySurface::keep_surface(const float* surface, size_t channels, Answer& kept) {
+  const size_t size = size_t(kept.size), half = size / 2;
+  kept.is_shown.assign(half * half, 0);
+  for (size_t cell = 0; cell < kept.odds.size(); ++cell) {
+    if (!(kept.odds[cell] < kBackgroundOdds)) kept.is_shown[cell / size / 2 * half + cell % size / 2] = 1;
+  }
+  kept.surface.resize(half * half * channels);
+  for (size_t cell = 0; cell < kept.is_shown.size(); ++cell) {
+    if (kept.is_shown[cell] != 0) {
+      std::copy_n(surface + cell * channels, channels, kept.surface.data() + cell * channels);
+    }
+  }
 }
 
 }  // namespace maq

@@ -1,6 +1,7 @@
 // A surface that does not flicker: in a stream, the answers of the dense head are averaged along the motion of people.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "densepose/surface/dense_decode.h"
@@ -27,7 +28,10 @@ class SteadySurface {
   struct Answer {
     AffineMap to_cells;
     int size = 0;
-    std::vector<float> labels, surface;
+    std::vector<float> labels;
+    std::vector<float> surface;     // of the cells that `is_shown`
+    std::vector<uint8_t> is_shown;  // by cell of the surface: one of its labels is not background
+    std::vector<float> odds;        // of a person, by cell, row by row
   };
   // The answer of the frame before for a cell: a weighted mean of four values that lie at `from`. `share`: how much it
   // counts.
@@ -39,12 +43,15 @@ class SteadySurface {
 
   const Answer* similar_to(const AffineMap& to_cells, int size) const;
   void find_sources(const AffineMap& to_cells, const DenseLogits& logits, const Answer& before);
+  static void keep_surface(const float* surface, size_t channels, Answer& kept);
 
   float steadiness_;
   FrameMotion motion_;
   std::vector<Answer> previous_, current_;  // memory is reused: the first so many count
   size_t previous_count_ = 0, current_count_ = 0;
   std::vector<Source> of_labels_, of_surface_;  // by cell of the labels and of the surface
+  std::vector<float> odds_;                     // of the new answer
+  std::vector<uint8_t> is_placed_;              // by cell of the surface: has a source
 };
 
 }  // namespace maq

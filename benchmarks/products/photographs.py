@@ -67,7 +67,7 @@ class PhotoTally:
         found = {"sets": {name: _counts(tally) for name, tally in self.sets.items()}}
         right, false = sum(p.found for p in people), sum(len(tally.alarms) for tally in self.sets.values())
         alone, crowded = ([p for p in people if (p.crowding == 0) == is_alone] for is_alone in (True, False))
-        nobody = self.without.metrics()
+        without = self.without.metrics()
         found |= {
             "people": len(people),
             "found": fraction(right, len(people)),
@@ -85,10 +85,10 @@ class PhotoTally:
             "common_joints": common.pck,
             "common_left_right": common.left_right,
             "groups": breakdown(people),
-            "empty_photos": nobody.empty_photos,
-            "false_people": nobody.false_people,
-            "animal_photos": nobody.animal_photos,
-            "false_people_by_animals": nobody.false_people_by_animals,
+            "empty_photos": without.empty_photos,
+            "false_people": without.false_people,
+            "animal_photos": without.animal_photos,
+            "false_people_by_animals": without.false_people_by_animals,
         }
         return plain(found)
 

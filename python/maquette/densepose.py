@@ -101,15 +101,9 @@ class DensePoseResult:
         """The pixel of the person at `index` that shows a point of the body surface: x and y, where (0.5, 0.5) is the
         middle of the first pixel, and how far its point is from the wanted point, in U and V. None if no pixel shows
         the part. Works for the latest 8 results of a `DensePose`. Raises MaquetteError."""
-        n = native()
-        pixel, distance = n.ffi.new("float[2]"), n.ffi.new("float *")
-        function = "maq_densepose_result_find_pixel"
-        status = n.ask(function, self._lent.handle, index, part, u, v, pixel, distance)
-        if status == n.lib.MAQ_ERROR_NOT_FOUND:
-            return None
-        if status:
-            n.fail(function, status)
-        return pixel[0], pixel[1], distance[0]
+        pixel, distance = native().ffi.new("float[2]"), native().ffi.new("float *")
+        arguments = self._lent.handle, index, part, u, v, pixel, distance
+        return (pixel[0], pixel[1], distance[0]) if _finds("maq_densepose_result_find_pixel", *arguments) else None
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes <path>_IUV.png, <path>_INDS.png and <path>.json in the DensePose convention
@@ -205,27 +199,27 @@ def surface_points(function: str, handle: Any) -> np.ndarray:
     return np.frombuffer(data, np.float32).reshape(shape).copy()
 
 
-def _head_box_px(result: Any, index: int) -> tuple[float, float, float, float] | None:
+def _finds(function: str, *arguments: Any) -> bool:
+    """Calls a function of the C API; False if it finds nothing. Raises MaquetteError."""
     n = native()
-    box_px = n.ffi.new("float[4]")
-    status = n.ask("maq_densepose_result_get_head_box", result, index, box_px)
-    if status == n.lib.MAQ_ERROR_NOT_FOUND:
+    status = n.ask(function, *arguments)
+    if status and status != n.lib.MAQ_ERROR_NOT_FOUND:
+        n.fail(function, status)
+    return status == 0
+
+
+def _head_box_px(result: Any, index: int) -> tuple[float, float, float, float] | None:
+    box_px = native().ffi.new("float[4]")
+    if not _finds("maq_densepose_result_get_head_box", result, index, box_px):
         return None
-    if status:
-        n.fail("maq_densepose_result_get_head_box", status)
     left, top, right, bottom = box_px
     return left, top, right, bottom
 
 
 def _keypoints(result: Any, index: int) -> np.ndarray | None:
-    n = native()
     keypoints = np.empty((len(KEYPOINTS), 3), np.float32)
-    status = n.ask("maq_densepose_result_get_keypoints", result, index, n.ffi.from_buffer("float[]", keypoints))
-    if status == n.lib.MAQ_ERROR_NOT_FOUND:
-        return None
-    if status:
-        n.fail("maq_densepose_result_get_keypoints", status)
-    return keypoints
+    into = native().ffi.from_buffer("float[]", keypoints)
+    return keypoints if _finds("maq_densepose_result_get_keypoints", result, index, into) else None
 
 
 def part_name(part: int) -> str:

@@ -44,8 +44,9 @@ MAQ_API maq_status maq_densepose_texture_get_size(const maq_densepose_texture* t
 /* Draws the texture into memory of the app: 4 bytes a pixel (R, G, B, A), in rows of `stride_bytes` bytes (0: rows
  * without padding). `rgba` has `size_bytes` bytes. The tile of part p is in column (p - 1) / 6 and row (p - 1) % 6. In
  * a tile, U grows to the right and V upwards. A is the confidence of the colour: 0 where no frame showed the surface,
- * 128 after two pixels, up to 255. Colours that no frame showed are those of the surface around them. One at a time.
- * Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory). Does not block. */
+ * 128 after two pixels, up to 255. Where A is 0, the colour is taken from the surface around.
+ *
+ * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (too little memory). Does not block. */
 MAQ_API maq_status maq_densepose_texture_draw(maq_densepose_texture* texture, uint8_t* rgba, size_t stride_bytes,
                                               size_t size_bytes);
 

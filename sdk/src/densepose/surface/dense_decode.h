@@ -89,9 +89,8 @@ float min_log_odds(float mask_threshold);
 // to [0, 1]. Pixels outside the image are left alone. `person` counts from 1. All people of an image need the same
 // `memory`. Where two people meet:
 // - If other people have more than 1 - `min_visible_fraction` of the person's pixels, nothing is painted.
-// - Otherwise a pixel goes to the person with the higher log-odds there (in eighths, up to 16; of equals the first),
-// but only
-//   if the other person keeps at least `min_visible_fraction` of its pixels.
+// - Otherwise a pixel goes to the person with the higher log-odds there (in eighths, up to 16), of equals to the first.
+//   But nobody is left with less than `min_visible_fraction` of its pixels.
 DecodeCounts paint_person(const DenseLogits& logits, const Box& box, uint8_t person, float mask_threshold,
                           float min_visible_fraction, DecodeMemory& memory, DensePlanes& planes);
 

@@ -139,14 +139,13 @@ void SteadySurface::find_sources(const AffineMap& to_cells, const DenseLogits& l
       const double shift_x = was.x - (column + 0.5), shift_y = was.y - (row + 0.5);
       const int middle_x = column - column % 2 + 1, middle_y = row - row % 2 + 1;
       const Between places = between_cells((middle_x + shift_x) / 2, (middle_y + shift_y) / 2, half);
-      bool is_known = places.is_inside;
-      for (int k = 0; is_known && k < 4; ++k) {
+      if (!places.is_inside) continue;
+      for (int k = 0; k < 4; ++k) {
         const size_t from = size_t(places.row + k / 2) * size_t(half) + size_t(places.column + k % 2);
-        is_known = before.is_shown[from] != 0;
         coarse.from[k] = from * channels;
         coarse.weights[k] = places.weights[k];
       }
-      coarse.share = is_known ? source.share : 0;
+      coarse.share = source.share;
     }
   }
 }
@@ -168,22 +167,7 @@ void SteadySurface::steady(const AffineMap& to_cells, const DenseLogits& logits,
   kept.size = logits.size;
   kept.labels.assign(labels, labels + cells * size_t(classes));
   find_odds(logits, kept.odds);
-  keep_surface(surface, size_t(channels), kept);
-}
-
-// The features are most of an answer, and most of them are of background.
-void SteadySurface::keep_surface(const float* surface, size_t channels, Answer& kept) {
-  const size_t size = size_t(kept.size), half = size / 2;
-  kept.is_shown.assign(half * half, 0);
-  for (size_t cell = 0; cell < kept.odds.size(); ++cell) {
-    if (!(kept.odds[cell] < kBackgroundOdds)) kept.is_shown[cell / size / 2 * half + cell % size / 2] = 1;
-  }
-  kept.surface.resize(half * half * channels);
-  for (size_t cell = 0; cell < kept.is_shown.size(); ++cell) {
-    if (kept.is_shown[cell] != 0) {
-      std::copy_n(surface + cell * channels, channels, kept.surface.data() + cell * channels);
-    }
-  }
+  kept.surface.assign(surface, surface + cells / 4 * size_t(channels));
 }
 
 }  // namespace maq

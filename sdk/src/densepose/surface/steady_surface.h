@@ -28,10 +28,8 @@ class SteadySurface {
   struct Answer {
     AffineMap to_cells;
     int size = 0;
-    std::vector<float> labels;
-    std::vector<float> surface;     // of the cells that `is_shown`
-    std::vector<uint8_t> is_shown;  // by cell of the surface: one of its labels is not background
-    std::vector<float> odds;        // of a person, by cell, row by row
+    std::vector<float> labels, surface;
+    std::vector<float> odds;  // of a person, by cell, row by row
   };
   // The answer of the frame before for a cell: a weighted mean of four values that lie at `from`. `share`: how much it
   // counts.
@@ -43,7 +41,6 @@ class SteadySurface {
 
   const Answer* similar_to(const AffineMap& to_cells, int size) const;
   void find_sources(const AffineMap& to_cells, const DenseLogits& logits, const Answer& before);
-  static void keep_surface(const float* surface, size_t channels, Answer& kept);
 
   float steadiness_;
   FrameMotion motion_;

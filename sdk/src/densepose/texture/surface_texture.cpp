@@ -167,10 +167,4 @@ void SurfaceTexture::draw(uint8_t* rgba, size_t stride_bytes) const {
   }
 }
 
-double SurfaceTexture::seen_fraction() const {
-  const auto seen =
-      std::count_if(texels_.begin(), texels_.end(), [](const Texel& t) { return t.weight >= kMinWeight; });
-  return double(seen) / double(texels_.size());
-}
-
 }  // namespace maq

@@ -31,9 +31,6 @@ class SurfaceTexture {
   // most 255. Texels that were not seen have the colours of the texels around them.
   void draw(uint8_t* rgba, size_t stride_bytes) const;
 
-  // Returns the fraction of texels that were seen. It stays below 1, because the charts do not fill their tiles.
-  double seen_fraction() const;
-
  private:
   struct Texel {
     std::array<float, 3> colour{};  // mean of R, G, B

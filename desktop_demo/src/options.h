@@ -35,7 +35,7 @@ struct Options {
   double fit_seconds = 3;  // of a head
   std::string heads_bundle;
   View view = View::kParts;
-  bool mesh = true;
+  bool mesh = true, person_colours = true;
   std::string texture, capture, scene_bundle;
   Compare compare = Compare::kNone;
   std::string bundle;

@@ -40,7 +40,7 @@ void Panel::draw_help(bool* is_open) const {
       "In the try-on view a dropped picture is worn.\n\n");
   constexpr const char* kKeys[][2] = {
       {"1 to 6", "camera, parts, U/V contours, mask, boxes, try-on"},
-      {"M", "the body's surface in the corner; drag or use the arrows to turn it"},
+      {"M, C", "the body's surface in the corner; in the person's colours; drag or use the arrows to turn it"},
       {"P", "pause"},
       {"F2", "snapshot: the picture, and the files of what was found in it"},
       {"F3", "clip of the picture (.mp4): begin, end"},

@@ -23,18 +23,26 @@ PeopleView::PeopleView(const maquette::Context& context, const Options& options,
       model_(options.model),
       view_(options.view),
       shows_mesh_(options.mesh),
+      wears_colours_(options.person_colours),
+      texture_(context),
       live_(
           context, options.model,
-          [this](maquette::PipelineResult mapped, double rate) {
-            frames_.back().copy_from(std::move(mapped), rate, &seen_);
-            frames_.publish();
-            Window::wake();
-          },
-          Window::wake, options.live) {
+          [this](maquette::PipelineResult mapped, double rate) { take(std::move(mapped), rate); }, Window::wake,
+          options.live) {
   set_live(&live_);
   // Software OpenGL compiles a shader when it draws with it first: now, before the user waits.
   for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
-  painter_.draw_body({0, 0, 8, 8}, 0, 0);
+  painter_.draw_body({0, 0, 8, 8}, 0, 0, false);
+}
+
+void PeopleView::take(maquette::PipelineResult mapped, double rate) {
+  // Ids begin anew with each source.
+  std::string source = live_.status().uri;
+  if (source != texture_source_) texture_.begin_again();
+  texture_source_ = std::move(source);
+  frames_.back().copy_from(std::move(mapped), rate, &seen_, wears_colours_ ? &texture_ : nullptr);
+  frames_.publish();
+  Window::wake();
 }
 
 bool PeopleView::update() {
@@ -48,6 +56,8 @@ bool PeopleView::update() {
   note_end();
   if (!frames_.take()) return false;
   painter_.set_frame(frame());
+  if (frame().texture != nullptr && frame().texture != shown_texture_) painter_.set_texture(*frame().texture);
+  shown_texture_ = frame().texture;
   const maq_densepose_stats& s = frame().stats;
   stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms + s.keypoints_ms,
                s.preprocess_ms, float(frame().copying_ms), float(frame().waiting_ms)});
@@ -70,6 +80,7 @@ Action PeopleView::press(int key) {
   if (key == GLFW_KEY_A) return Action::kAddToHead;
   if (key >= GLFW_KEY_1 && key <= GLFW_KEY_6) view_ = View(key - GLFW_KEY_1);
   if (key == GLFW_KEY_M) shows_mesh_ = !shows_mesh_;
+  if (key == GLFW_KEY_C) wears_colours_ = !wears_colours_;
   return LiveView::press(key);
 }
 
@@ -87,7 +98,7 @@ void PeopleView::draw(const Rect& area) {
   if (!shows_mesh_) return;
   const int side = std::min(area.width, area.height) * 3 / 10;
   mesh_rect_ = {0, area.height - side, side, side};
-  painter_.draw_body(mesh_rect_, yaw_, pitch_);
+  painter_.draw_body(mesh_rect_, yaw_, pitch_, shown_texture_ != nullptr);
 }
 
 void PeopleView::draw_marks() const {
@@ -163,7 +174,8 @@ void PeopleView::draw_views() {
     if (ImGui::RadioButton(kViewNames[view], view_ == View(view))) view_ = View(view);
   }
   ImGui::Checkbox("body surface (M)", &shows_mesh_);
-  ImGui::SameLine();
+  bool wears_colours = wears_colours_;
+  if (shows_mesh_ && ImGui::Checkbox("in the person's colours (C)", &wears_colours)) wears_colours_ = wears_colours;
   draw_pause();
   if (view_ == View::kTryOn) ImGui::TextWrapped("Drop a picture to wear it.");
 }

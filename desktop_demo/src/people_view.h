@@ -5,7 +5,10 @@
 #include <app/live_head.h>
 #include <app/mapped_frame.h>
 #include <app/triple_buffer.h>
+#include <atomic>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "live_view.h"
@@ -31,7 +34,8 @@ class PeopleView final : public LiveView {
 
  private:
   const maquette::MappedFrame& frame() const { return frames_.front(); }
-  void draw_marks() const;  // skeletons, and in their view boxes
+  void take(maquette::PipelineResult mapped, double rate);  // on the pipeline's thread
+  void draw_marks() const;                                  // skeletons, and in their view boxes
   void draw_views();
   void draw_model_options();
 
@@ -39,9 +43,15 @@ class PeopleView final : public LiveView {
   float roll_rad_ = 0;
   View view_;
   bool shows_mesh_, has_surface_ = false;
+  std::atomic<bool> wears_colours_;  // the body in the corner, the person's
+  std::shared_ptr<const maquette::RgbaImage> shown_texture_;
   float yaw_ = 0.5f, pitch_ = 0.15f;  // of the body
   Rect mesh_rect_;                    // empty where no body is drawn
   maquette::TripleBuffer<maquette::MappedFrame> frames_;
-  std::vector<uint8_t> seen_;     // of the pipeline's thread
+  // Of the pipeline's thread:
+  std::vector<uint8_t> seen_;
+  maquette::GrowingTexture texture_;
+  std::string texture_source_;  // its URI
+
   maquette::LiveDensePose live_;  // last: its thread uses the others
 };

@@ -24,7 +24,8 @@ void add_skeletons(const DensePoseResult& result, std::vector<std::array<float, 
 
 }  // namespace
 
-void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before) {
+void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before,
+                            GrowingTexture* growing) {
   const auto before = std::chrono::steady_clock::now();
   camera.copy_from(mapped.frame);
   DensePoseResult densepose = densepose_of(mapped);
@@ -48,6 +49,8 @@ void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint
     (*seen_before)[(chart * kSeenCells + v) * kSeenCells + u] = 255;
   }
   seen = *seen_before;
+  if (growing != nullptr) growing->add(densepose, mapped.frame);
+  texture = growing != nullptr ? growing->image() : nullptr;
   people = densepose.people();
   skeletons.clear();
   add_skeletons(densepose, &skeletons);

@@ -10,7 +10,8 @@
 namespace {
 
 // As the shaders call them, in the order of Painter::Texture.
-constexpr const char* kTextureNames[] = {"camera", "iuv", "outfit", "surface", "seen", "rendering", "photo", "drawn"};
+constexpr const char* kTextureNames[] = {"camera", "iuv",       "outfit", "surface", "seen",
+                                         "person", "rendering", "photo",  "drawn"};
 
 // Each texture stays bound to a unit of its own; the first is Dear ImGui's.
 constexpr int kFirstUnit = 1;
@@ -18,7 +19,8 @@ void activate(int texture) { glActiveTexture(unsigned(GL_TEXTURE0 + kFirstUnit +
 
 unsigned compiled(unsigned kind, const char* source) {
   const unsigned shader = glCreateShader(kind);
-  glShaderSource(shader, 1, &source, nullptr);
+  const char* const sources[] = {kShaderStart, source};
+  glShaderSource(shader, 2, sources, nullptr);
   glCompileShader(shader);
   int fine = 0;
   glGetShaderiv(shader, GL_COMPILE_STATUS, &fine);
@@ -107,6 +109,10 @@ void Painter::set_outfit(const maquette::RgbaImage& outfit) {
   outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
 }
 
+void Painter::set_texture(const maquette::RgbaImage& texture) {
+  upload(kPersonTexture, texture.width_px, texture.height_px, texture.rgba.data());
+}
+
 void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
                         const maquette::RgbaImage& sample) {
   upload(kRenderingTexture, rendering.width_px, rendering.height_px, rendering.rgba.data());
@@ -153,7 +159,7 @@ void Painter::draw_scene(const Rect& rect, float slider) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
+void Painter::draw_body(const Rect& rect, float yaw, float pitch, bool in_own_colours) {
   if (body_vertex_count_ == 0) return;
   use(body_program_, rect);
   glEnable(GL_DEPTH_TEST);
@@ -170,6 +176,7 @@ void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
                                   {0, -middle * up[2], middle * eye[2] / 4, 1}};
   glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection[0]);
   glUniform3fv(uniform("towards_eye"), 1, eye);
+  glUniform1i(uniform("in_own_colours"), in_own_colours ? 1 : 0);
   glDrawArrays(GL_TRIANGLES, 0, body_vertex_count_);
   glDisable(GL_DEPTH_TEST);
 }

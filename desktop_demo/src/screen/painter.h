@@ -17,6 +17,8 @@ class Painter {
   // repeated over the body's front and back.
   void set_outfit(const maquette::RgbaImage& outfit);
   void set_body(const maquette::DensePoseMesh& body);
+  // Colours of a person on the body, as maq_densepose_texture_draw describes them.
+  void set_texture(const maquette::RgbaImage& texture);
   void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
                  const maquette::RgbaImage& sample = {});
 
@@ -24,8 +26,8 @@ class Painter {
   // `slider`: the fraction of the width that shows the photo; kSample: the sample.
   static constexpr float kSample = 2;
   void draw_scene(const Rect& rect, float slider);
-  // Draws the body from a direction, in radians, with seen parts in colour.
-  void draw_body(const Rect& rect, float yaw, float pitch);
+  // Draws the body from a direction, in radians, in the colours of the person or with seen parts in colours of parts.
+  void draw_body(const Rect& rect, float yaw, float pitch, bool in_own_colours);
 
  private:
   enum Texture {
@@ -34,6 +36,7 @@ class Painter {
     kOutfitTexture,
     kSurfaceTexture,
     kSeenTexture,
+    kPersonTexture,
     kRenderingTexture,
     kPhotoTexture,
     kSampleTexture,

@@ -1,8 +1,17 @@
 // GLSL 3.30: images of people, and the body that turns in the corner.
 #pragma once
 
+// Before each of the others. `in_atlas` looks up part `chart` + 1 in an atlas of 4 x 6 tiles, which do not bleed into
+// each other: half a texel stays between.
+constexpr char kShaderStart[] = R"(#version 330 core
+vec4 in_atlas(sampler2D atlas, int chart, vec2 uv) {
+  vec2 half_texel = 0.5 * vec2(4.0, 6.0) / vec2(textureSize(atlas, 0));
+  vec2 in_tile = clamp(vec2(uv.x, 1.0 - uv.y), half_texel, 1.0 - half_texel);
+  return textureLod(atlas, (vec2(chart / 6, chart % 6) + in_tile) / vec2(4.0, 6.0), 0.0);
+})";
+
 // Covers the viewport with one triangle; `at` is in the image, from its top left corner, 0 to 1.
-constexpr char kPictureVertexShader[] = R"(#version 330 core
+constexpr char kPictureVertexShader[] = R"(
 out vec2 at;
 void main() {
   vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
@@ -12,7 +21,7 @@ void main() {
 
 // `view` counts as View in options.h. Part, U, V are the label that most of the four nearest pixels have, and of these
 // the bilinear mean, so that nothing bleeds from one chart into the next and edges are smooth at any size.
-constexpr char kPeopleShader[] = R"(#version 330 core
+constexpr char kPeopleShader[] = R"(
 in vec2 at;
 out vec4 colour;
 uniform sampler2D camera, outfit, iuv;
@@ -71,12 +80,7 @@ float contour(vec4 here, vec2 p, float screen_px, int plane) {
 
 vec3 worn(vec4 here) {
   int part = int(here.x + 0.5) - 1;
-  if (outfit_is_atlas) {
-    // Tiles do not bleed into each other: half a texel stays between.
-    vec2 half_texel = 0.5 * vec2(4.0, 6.0) / vec2(textureSize(outfit, 0));
-    vec2 in_tile = clamp(vec2(here.y, 1.0 - here.z), half_texel, 1.0 - half_texel);
-    return textureLod(outfit, (vec2(part / 6, part % 6) + in_tile) / vec2(4.0, 6.0), 0.0).rgb;
-  }
+  if (outfit_is_atlas) return in_atlas(outfit, part, here.yz).rgb;
   vec3 point = texture(surface, vec3(here.yz, part)).xyz;  // metres
   vec2 shape = vec2(textureSize(outfit, 0));
   vec2 place = vec2(point.y < 0.0 ? point.x : -point.x, 1.45 - point.z) / 0.45;
@@ -111,7 +115,7 @@ void main() {
 })";
 
 // Photo left of the slider and rendering right of it, or the error alone.
-constexpr char kSceneShader[] = R"(#version 330 core
+constexpr char kSceneShader[] = R"(
 in vec2 at;
 out vec4 colour;
 uniform sampler2D rendering, photo, drawn;
@@ -121,7 +125,7 @@ void main() {
   colour.a = 1.0;
 })";
 
-constexpr char kBodyVertexShader[] = R"(#version 330 core
+constexpr char kBodyVertexShader[] = R"(
 layout(location = 0) in vec3 point;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 label;  // part - 1, U, V
@@ -137,15 +141,27 @@ void main() {
   gl_Position = projection * vec4(point, 1.0);
 })";
 
-constexpr char kBodyShader[] = R"(#version 330 core
+constexpr char kBodyShader[] = R"(
 in vec3 place, facing;
 flat in int part;
 in vec2 uv;
 out vec4 colour;
 uniform sampler2DArray seen;
+uniform sampler2D person;
 uniform vec3 part_colours[25], towards_eye;
+uniform bool in_own_colours;
 void main() {
-  float light = 0.35 + 0.65 * abs(dot(normalize(facing), towards_eye));
-  float lit = texture(seen, vec3(uv, part)).r;
-  colour = vec4(mix(vec3(0.30, 0.31, 0.34), part_colours[part + 1] * 1.15, smoothstep(0.1, 0.6, lit)) * light, 1.0);
+  float slope = abs(dot(normalize(facing), towards_eye));
+  vec3 shown;
+  float known, light = 0.35 + 0.65 * slope;
+  if (in_own_colours) {
+    vec4 texel = in_atlas(person, part, uv);
+    shown = texel.rgb;
+    known = smoothstep(0.0, 0.5, texel.a);
+    light = mix(light, 0.75 + 0.25 * slope, known);  // the photo has its own light
+  } else {
+    shown = part_colours[part + 1] * 1.15;
+    known = smoothstep(0.1, 0.6, texture(seen, vec3(uv, part)).r);
+  }
+  colour = vec4(mix(vec3(0.30, 0.31, 0.34), shown, known) * light, 1.0);
 })";

@@ -70,6 +70,36 @@ TEST_F(MappedFrame, WhatIsSeenOfTheBodyIsTheCellsOfItsLabels) {
   EXPECT_EQ(seen_, wanted);
 }
 
+TEST_F(MappedFrame, HasTheColoursOfThePersonWhoIsFollowed) {
+  maquette::GrowingTexture growing(context_);
+  maquette::MappedFrame frame;
+  frame.copy_from(mapped(), 1, &seen_, &growing);
+  ASSERT_NE(frame.texture, nullptr);
+  const std::shared_ptr<const maquette::RgbaImage> first = frame.texture;
+  EXPECT_EQ(first->width_px * 6, first->height_px * 4);
+  // Of the largest person, as a texture alone has them.
+  maquette::PipelineResult again = mapped();
+  const maquette::DensePoseResult densepose = maquette::densepose_of(again);
+  const std::vector<maq_densepose_person> people = densepose.people();
+  const auto area = [](const maq_densepose_person& person) {
+    return (person.box_px[2] - person.box_px[0]) * (person.box_px[3] - person.box_px[1]);
+  };
+  uint32_t largest = 0;
+  for (uint32_t i = 0; i < people.size(); ++i) largest = area(people[i]) > area(people[largest]) ? i : largest;
+  maquette::DensePoseTexture alone(context_);
+  alone.add_person(densepose, largest, again.frame);
+  EXPECT_EQ(first->rgba, alone.draw());
+  // It is drawn anew after eight frames only, and begins again with another source.
+  frame.copy_from(std::move(again), 1, &seen_, &growing);
+  EXPECT_EQ(frame.texture, first);
+  growing.begin_again();
+  frame.copy_from(mapped(), 1, &seen_, &growing);
+  EXPECT_NE(frame.texture, first);
+  EXPECT_EQ(frame.texture->rgba, first->rgba);
+  frame.copy_from(mapped(), 1, &seen_);
+  EXPECT_EQ(frame.texture, nullptr);
+}
+
 TEST_F(MappedFrame, WhatWasSeenBeforeFades) {
   seen_.assign(24 * kCells * kCells, 160);
   maquette::MappedFrame frame;

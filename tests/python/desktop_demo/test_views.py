@@ -200,8 +200,20 @@ def test_another_texture_is_worn_instead(shown, mapped, tmp_path):
     assert (nearest == mapped.iuv[inside][:, 0]).mean() > 0.95
 
 
+def test_the_body_in_the_corner_gets_the_colours_of_the_person(shown, mapped):
+    by_part, as_person = shown("camera", "--no-person-colours"), shown("camera")
+    body, other = (picture.rectangle("mesh_px").astype(float) for picture in (as_person, by_part))
+    coloured = np.abs(body - other).max(-1) > 30
+    assert coloured.mean() > 0.02
+    # The image shows each of these colours, as bright or darker: the body has a light of its own.
+    near = body[coloured] @ np.ones(3)
+    image = np.unique((mapped.frame[mapped.iuv[..., 0] > 0] // 8).reshape(-1, 3), axis=0) * 8.0 + 4
+    hues = directions(image) @ directions(body[coloured][near > 60]).T
+    assert (hues.max(0) > 0.98).mean() > 0.9
+
+
 def test_the_body_in_the_corner_is_coloured_where_it_was_seen(shown, mapped):
-    without, with_mesh = shown("camera", "--no-mesh"), shown("camera", "--mesh")
+    without, with_mesh = shown("camera", "--no-mesh"), shown("camera", "--mesh", "--no-person-colours")
     body = with_mesh.rectangle("mesh_px").astype(float)
     x, y, wide, tall = with_mesh.report["mesh_px"]
     behind = without.screenshot[y : y + tall, x : x + wide].astype(float)

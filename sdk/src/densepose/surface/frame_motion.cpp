@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-
-#include "core/simd_clones.h"
+#include <cstring>
 
 namespace maq {
 namespace {
@@ -38,13 +37,23 @@ Bright brightness_of(const ImageView& image) {
 
 uint8_t mean(int a, int b, int c, int d) { return uint8_t((a + b + c + d + 2) / 4); }
 
-// The sum of absolute differences of two windows, given by their middles.
-MAQ_SIMD_CLONES int difference(const uint8_t* a, const uint8_t* b, int stride, int half) {
+// The sum of absolute differences of two windows of 2 kHalf pixels each way, given by their middles. Ends early when it
+// is not less than `enough`. Four rows are copied side by side because compilers then take the processor's instruction
+// for such sums, also for rows of 8 bytes.
+template <int kHalf>
+int difference(const uint8_t* a, const uint8_t* b, int stride, int enough) {
+  constexpr int kSide = 2 * kHalf, kRows = 4;
+  const ptrdiff_t corner = ptrdiff_t(kHalf) * stride + kHalf;
+  a -= corner;
+  b -= corner;
   int sum = 0;
-  for (int y = -half; y < half; ++y) {
-    const uint8_t* const p = a + ptrdiff_t(y) * stride - half;
-    const uint8_t* const q = b + ptrdiff_t(y) * stride - half;
-    for (int x = 0; x < 2 * half; ++x) sum += std::abs(int(p[x]) - int(q[x]));
+  for (int y = 0; y < kSide && sum < enough; y += kRows) {
+    uint8_t p[kRows * kSide], q[kRows * kSide];
+    for (int row = 0; row < kRows; ++row, a += stride, b += stride) {
+      std::memcpy(p + row * kSide, a, kSide);
+      std::memcpy(q + row * kSide, b, kSide);
+    }
+    for (int i = 0; i < kRows * kSide; ++i) sum += std::abs(int(p[i]) - int(q[i]));
   }
   return sum;
 }
@@ -56,6 +65,51 @@ float minimum_between(int before, int middle, int after) {
 }
 
 }  // namespace
+
+// A window of one level, as near to a place as it fits, against the frame before.
+template <int kHalf>
+class FrameMotion::Window {
+ public:
+  static constexpr int kPixels = 4 * kHalf * kHalf;
+
+  Window(const Level& now, const Level& before, int middle_x, int middle_y)
+      : now_(now),
+        before_(before),
+        x_(std::clamp(middle_x, kHalf, now.width - kHalf)),
+        y_(std::clamp(middle_y, kHalf, now.height - kHalf)) {}
+
+  // From where it would have come by that motion, or a number that is not less than `enough`; kOutside if it was not in
+  // the frame.
+  int difference_by(int dx, int dy, int enough = kOutside) const {
+    const int from_x = x_ - dx, from_y = y_ - dy;
+    if (from_x < kHalf || from_y < kHalf || from_x > before_.width - kHalf || from_y > before_.height - kHalf)
+      return kOutside;
+    return difference<kHalf>(now_.values.data() + ptrdiff_t(y_) * now_.width + x_,
+                             before_.values.data() + ptrdiff_t(from_y) * before_.width + from_x, now_.width, enough);
+  }
+
+  // The best motion within `reach` of `around`, if it is clearly better than rest: ring after ring, as most motions are
+  // small and a good one soon ends the sums of others.
+  Vector best(Vector around, int reach) const {
+    Vector best_motion;
+    int lowest = difference_by(0, 0) - kMinGain * kPixels;
+    for (int ring = 0; ring <= reach; ++ring) {
+      for (int dy = -ring; dy <= ring; ++dy) {
+        const int step = ring == 0 || std::abs(dy) == ring ? 1 : 2 * ring;
+        for (int dx = -ring; dx <= ring; dx += step) {
+          if (lowest <= 0) return best_motion;
+          const int sum = difference_by(around.x + dx, around.y + dy, lowest);
+          if (sum < lowest) lowest = sum, best_motion = {around.x + dx, around.y + dy};
+        }
+      }
+    }
+    return best_motion;
+  }
+
+ private:
+  const Level &now_, &before_;
+  int x_, y_;
+};
 
 void FrameMotion::next(const ImageView& image, bool follows_last) {
   const Bright bright = brightness_of(image);
@@ -111,53 +165,19 @@ const FrameMotion::Motion& FrameMotion::at(const Point& point) {
 }
 
 FrameMotion::Motion FrameMotion::matched(int column, int row) const {
-  // A window of one level, as near to the block as it fits, against the frame before.
-  struct Window {
-    const Level &now, &before;
-    int half, x, y;
-
-    Window(const Level& level_now, const Level& level_before, int window_half, int middle_x, int middle_y)
-        : now(level_now),
-          before(level_before),
-          half(window_half),
-          x(std::clamp(middle_x, half, now.width - half)),
-          y(std::clamp(middle_y, half, now.height - half)) {}
-
-    // From where it would have come by that motion; kOutside if it was not in the frame.
-    int difference_by(int dx, int dy) const {
-      const int from_x = x - dx, from_y = y - dy;
-      if (from_x < half || from_y < half || from_x > before.width - half || from_y > before.height - half)
-        return kOutside;
-      return difference(now.values.data() + ptrdiff_t(y) * now.width + x,
-                        before.values.data() + ptrdiff_t(from_y) * before.width + from_x, now.width, half);
-    }
-    int pixels() const { return 4 * half * half; }
-    // The best motion within `reach` of `around`, if it is clearly better than rest.
-    Vector best(Vector around, int reach) const {
-      Vector best_motion;
-      int least = difference_by(0, 0) - kMinGain * pixels();
-      for (int dy = around.y - reach; dy <= around.y + reach; ++dy) {
-        for (int dx = around.x - reach; dx <= around.x + reach; ++dx) {
-          const int sum = difference_by(dx, dy);
-          if (sum < least) least = sum, best_motion = {dx, dy};
-        }
-      }
-      return best_motion;
-    }
-  };
   const int x = column * kBlock + kBlock / 2, y = row * kBlock + kBlock / 2;
-  const Vector rough = Window(now_.coarse, before_.coarse, kCoarseHalf, x / 2, y / 2).best({}, kCoarseReach);
-  const Window fine(now_.fine, before_.fine, kFineHalf, x, y);
+  const Vector rough = Window<kCoarseHalf>(now_.coarse, before_.coarse, x / 2, y / 2).best({}, kCoarseReach);
+  const Window<kFineHalf> fine(now_.fine, before_.fine, x, y);
   const Vector motion = fine.best({2 * rough.x, 2 * rough.y}, kFineReach);
-  const int least = fine.difference_by(motion.x, motion.y);
+  const int lowest = fine.difference_by(motion.x, motion.y);
   float rest_x = 0, rest_y = 0;
   if (motion.x != 0 || motion.y != 0) {
     const auto beside = [&](int dx, int dy) { return fine.difference_by(motion.x + dx, motion.y + dy); };
-    rest_x = minimum_between(beside(-1, 0), least, beside(1, 0));
-    rest_y = minimum_between(beside(0, -1), least, beside(0, 1));
+    rest_x = minimum_between(beside(-1, 0), lowest, beside(1, 0));
+    rest_y = minimum_between(beside(0, -1), lowest, beside(0, 1));
   }
   return {(float(motion.x) + rest_x) * float(step_), (float(motion.y) + rest_y) * float(step_),
-          float(least) / float(fine.pixels())};
+          float(lowest) / float(fine.kPixels)};
 }
 
 }  // namespace maq

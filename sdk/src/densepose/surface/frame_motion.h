@@ -36,6 +36,9 @@ class FrameMotion {
     int x = 0, y = 0;
   };
 
+  template <int kHalf>
+  class Window;
+
   Motion matched(int column, int row) const;
 
   Levels now_, before_;

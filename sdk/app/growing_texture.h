@@ -1,0 +1,35 @@
+// The colours of one person on the body surface, which grow from frame to frame.
+#pragma once
+
+#include <cstdint>
+#include <maquette/maquette.hpp>
+#include <memory>
+#include <optional>
+
+#include "app/rgba_image.h"
+
+namespace maquette {
+
+// One thread at a time.
+class GrowingTexture {
+ public:
+  explicit GrowingTexture(const Context& context) : context_(context) {}
+
+  // Adds what a frame shows of the person. That is the largest one of the first frame with people; when this person
+  // has been away for 90 frames, it begins again with the largest one then.
+  void add(const DensePoseResult& result, const Frame& frame);
+
+  void begin_again() { texture_.reset(); }
+
+  // The texture as maq_densepose_texture_draw describes it, of one of the last eight frames; null before there is one.
+  const std::shared_ptr<const RgbaImage>& image() const { return image_; }
+
+ private:
+  const Context& context_;
+  std::optional<DensePoseTexture> texture_;
+  int64_t person_ = 0;  // whose texture it is
+  int frames_away_ = 0, frames_since_drawn_ = 0;
+  std::shared_ptr<const RgbaImage> image_;
+};
+
+}  // namespace maquette

@@ -66,7 +66,7 @@ MAQ_SIMD_CLONES void sample_row(const uint32_t* __restrict quads, int quads_widt
     const float over_u = u > 0.0f ? u : 0.0f, over_v = v > 0.0f ? v : 0.0f;
     const float in_u = over_u < last_x ? over_u : last_x, in_v = over_v < last_y ? over_v : last_y;
     const int column = int(in_u), line = int(in_v);
-    const int right = int((in_u - float(column)) * 64.0f), down = int((in_v - float(line)) * 64.0f);
+    const int right = int((in_u - float(column)) * 64.0f + 0.5f), down = int((in_v - float(line)) * 64.0f + 0.5f);
     const uint32_t quad = quads[line * quads_width + column];
     const int above = int(quad & 255u) * (64 - right) + int(quad >> 8 & 255u) * right;
     const int below = int(quad >> 16 & 255u) * (64 - right) + int(quad >> 24) * right;

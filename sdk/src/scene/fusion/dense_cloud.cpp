@@ -89,7 +89,8 @@ std::optional<DenseCloud> make_dense_cloud(const DenseCloudInput& input, const D
   bool is_cancelled = false;
   const std::vector<FusedPixel> pixels =
       fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
-        is_cancelled = progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
+        is_cancelled =
+            progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
         return !is_cancelled;
       });
   if (is_cancelled) return {};

@@ -39,8 +39,8 @@ MAQ_SIMD_CLONES void project_row(const Projection& given, int y, const float* __
     const float inverse = 1.0f / z;
     const float u = ((at[0] + by.turn[0] * x) * here + by.shift[0]) * inverse;
     const float v = ((at[1] + by.turn[3] * x) * here + by.shift[1]) * inverse;
-    const int inside = int(here > 0.0f) & int(z > 0.0f) & int(u > -0.5f) & int(v > -0.5f) & int(u < right) &
-                       int(v < bottom);
+    const int inside =
+        int(here > 0.0f) & int(z > 0.0f) & int(u > -0.5f) & int(v > -0.5f) & int(u < right) & int(v < bottom);
     const float in_u = inside != 0 ? u : 0.0f, in_v = inside != 0 ? v : 0.0f;
     const int pixel = int(in_v + 0.5f) * by.width_px + int(in_u + 0.5f);
     pixels[i] = inside != 0 ? pixel : -1;

@@ -13,8 +13,8 @@ namespace maq {
 
 struct DepthMap {
   PinholeCamera camera;
-  std::vector<float> depth;           // along the optical axis, row by row; 0: unknown
-  std::vector<uint32_t> neighbours;   // maps that see the same
+  std::vector<float> depth;          // along the optical axis, row by row; 0: unknown
+  std::vector<uint32_t> neighbours;  // maps that see the same
 };
 
 // Chosen on captures for validation: docs/research/scenes.md, "Fusion".
@@ -34,8 +34,8 @@ struct FusedPixel {
 // Gets the finished fraction, 0..1. False cancels.
 using FusionProgress = std::function<bool(double done)>;
 
-// The pixels whose points are kept, by map and pixel; at most `max_points` of them (0: all), at random. The same for any
-// number of threads. Nothing is asked of points that no neighbour sees. Empty when cancelled, too.
+// The pixels whose points are kept, by map and pixel; at most `max_points` of them (0: all), at random. The same for
+// any number of threads. Nothing is asked of points that no neighbour sees. Empty when cancelled, too.
 std::vector<FusedPixel> fuse_depth_maps(const std::vector<DepthMap>& maps, const FusionRule& rule, uint64_t max_points,
                                         WorkerThreads& threads, const FusionProgress& progress = {});
 

@@ -93,7 +93,7 @@ TEST(DepthFusion, AgreesWithTheRuleInDouble) {
       agreeing[m].push_back(votes);
     }
   }
-  for (const int trust : {1, 2, 4}) {
+  for (const int trust : {0, 1, 2, 4}) {
     FusionRule rule;
     rule.min_trust = trust;
     const auto kept = set_of(fuse(maps, rule));

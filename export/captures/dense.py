@@ -9,7 +9,7 @@ import numpy as np
 from export.camera import Camera
 from export.captures.structure import CaptureError
 
-POINTS = 500_000
+POINTS = 200_000
 _MIN_POINTS = 1000
 
 

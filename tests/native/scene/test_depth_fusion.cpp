@@ -175,7 +175,9 @@ TEST(DepthFusion, CancelledItHasNoPoints) {
 TEST(DepthFusion, PointsLieWhereTheirDepthIs) {
   const std::vector<DepthMap> maps = {
       map_of(textured_scene::plane({0.2, 0.1, 1}, 2), turned(camera_at({0.1, 0, 0}), 0.2))};
-  const maq::PointCloud cloud = points_of(maps, fuse(maps, {}), {5, 6, 7});
+  std::vector<FusedPixel> pixels = fuse(maps, {});
+  const maq::PointCloud cloud = points_of(maps, {5, 6, 7}, pixels);
+  EXPECT_EQ(pixels.size(), cloud.count());
   ASSERT_GT(cloud.count(), 10000u);
   for (size_t i = 0; i < cloud.count(); ++i) {
     EXPECT_NEAR(0.2 * (double(cloud.x[i]) + 5) + 0.1 * (double(cloud.y[i]) + 6) + double(cloud.z[i]) + 7, 2, 1e-5);

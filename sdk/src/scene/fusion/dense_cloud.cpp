@@ -88,14 +88,13 @@ std::optional<DenseCloud> make_dense_cloud(const DenseCloudInput& input, const D
   FusionRule rule;
   rule.min_trust = input.photos < kPhotosWithTrust ? 0 : kTrust;
   bool is_cancelled = false;
-  const std::vector<FusedPixel> pixels =
-      fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
-        is_cancelled =
-            progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
-        return !is_cancelled;
-      });
+  std::vector<FusedPixel> pixels = fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
+    is_cancelled =
+        progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
+    return !is_cancelled;
+  });
   if (is_cancelled) return {};
-  made.cloud = points_of(made.maps, pixels, input.points.origin);
+  made.cloud = points_of(made.maps, input.points.origin, pixels);
   if (options.wants_colours) made.cloud.rgb = colours_of(input, pixels);
   return made;
 }

@@ -39,8 +39,8 @@ using FusionProgress = std::function<bool(double done)>;
 std::vector<FusedPixel> fuse_depth_maps(const std::vector<DepthMap>& maps, const FusionRule& rule, uint64_t max_points,
                                         WorkerThreads& threads, const FusionProgress& progress = {});
 
-// Their positions, relative to `origin`.
-PointCloud points_of(const std::vector<DepthMap>& maps, const std::vector<FusedPixel>& pixels,
-                     const std::array<double, 3>& origin);
+// Their positions, relative to `origin`. Pixels whose position is too far for a float are taken out of `pixels`.
+PointCloud points_of(const std::vector<DepthMap>& maps, const std::array<double, 3>& origin,
+                     std::vector<FusedPixel>& pixels);
 
 }  // namespace maq

@@ -59,7 +59,8 @@ double neighbour_score(const PinholeCamera& a, const PinholeCamera& b, const std
       length_a += to_a * to_a;
       length_b += to_b * to_b;
     }
-    cosines.push_back(dot / std::sqrt(length_a * length_b));
+    const double cosine = dot / std::sqrt(length_a * length_b);
+    if (std::isfinite(cosine)) cosines.push_back(cosine);
     ++i, ++j;
   }
   if (cosines.size() < kMinShared) return 0;

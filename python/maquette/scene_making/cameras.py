@@ -105,9 +105,12 @@ def _mappers(
                 token.cancel()
 
         folder = _fresh(out)
-        models = pycolmap.incremental_mapping(
-            database, images, folder, options=options, next_image_callback=one_more, cancellation_token=token
-        )
+        try:
+            models = pycolmap.incremental_mapping(
+                database, images, folder, options=options, next_image_callback=one_more, cancellation_token=token
+            )
+        except InterruptedError:  # by the token
+            models = {}
         if stopped:
             raise stopped[0]
         return models

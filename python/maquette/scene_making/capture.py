@@ -32,7 +32,9 @@ class SparsePoints:
 
     def save(self, path: Path) -> None:
         counts = np.array([len(numbers) for numbers in self.seen])
-        np.savez(path, xyz=self.xyz, rgb=self.rgb, counts=counts, seen=np.concatenate([*self.seen, []]).astype(np.int64))
+        np.savez(
+            path, xyz=self.xyz, rgb=self.rgb, counts=counts, seen=np.concatenate([*self.seen, []]).astype(np.int64)
+        )
 
     @staticmethod
     def load(path: Path) -> SparsePoints:

@@ -15,13 +15,29 @@ from maquette.scene_making.motion import motion_between, sharpness, shrunk
 from maquette.scene_making.photos import LeftOut, Photo, Prepared, fault_of, scaled_size
 from maquette.sources import Source
 
-ENDINGS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts", ".3gp", ".wmv", ".flv", ".ogv")
+ENDINGS = (
+    ".mp4",
+    ".mov",
+    ".m4v",
+    ".avi",
+    ".mkv",
+    ".webm",
+    ".mpg",
+    ".mpeg",
+    ".ts",
+    ".mts",
+    ".3gp",
+    ".wmv",
+    ".flv",
+    ".ogv",
+)
 _RATE = 10.0  # candidates a second, of films up to a minute
 _MAX_CANDIDATES = 600
 _PIECES = 4  # of time for each frame that may be chosen; the sharpest candidate of each is kept
 _STEP = 0.035  # motion of the image between chosen frames, in diagonals
 _STILL = 0.03  # motion of a whole film below which nothing is seen from two sides
-_MIN_FRAMES = 12
+_CUT = 1.5  # change of the image in a cut, over the median
+_MIN_RATE = 2.0  # chosen frames a second, where little moves
 
 
 @dataclass(eq=False)
@@ -55,10 +71,11 @@ def prepare_film(path: Path, target: Path, max_frames: int, progress: Callable[[
     piece_s = max(duration_s / (_PIECES * max_frames), 1 / rate)
     kept: list[_Candidate] = []
     faults: dict[str, int] = {}
-    cuts: list[float] = []
+    jumps: list[tuple[float, float, float]] = []  # time, duration, change of the image in grey levels
+    changes: list[float] = []
     best: tuple[float, float, float, Frame] | None = None  # time, way, sharpness
     before: np.ndarray | None = None
-    way, lost_at, count, end_s = 0.0, None, 0, piece_s
+    way, lost, count, end_s = 0.0, False, 0, piece_s
     with Source(film_uri(path, f"?size={width}x{height}&fps={rate:g}")) as source:
         for frame in source:
             time_s = frame.timestamp_ns / 1e9
@@ -74,14 +91,14 @@ def prepare_film(path: Path, target: Path, max_frames: int, progress: Callable[[
                 continue
             small = shrunk(grey)
             moved = 0.0 if before is None else motion_between(before, small)
+            change = 0.0 if before is None else float(np.abs(small - before).mean())
             if moved is None:
-                if lost_at is None:
-                    lost_at = time_s
-                moved = _STEP
-            elif lost_at is not None:  # one jump between two calm pieces is a cut; a fast pan loses more than one
-                if time_s - lost_at <= 1.5 / rate:
-                    cuts.append(lost_at)
-                lost_at = None
+                first = jumps.pop() if lost else (time_s, 0.0, change)
+                jumps.append((first[0], time_s - first[0], max(first[2], change)))
+                lost, moved = True, _STEP
+            else:
+                changes.append(change)
+                lost = False
             way += moved
             before = small
             sharp = sharpness(grey)
@@ -100,7 +117,10 @@ def prepare_film(path: Path, target: Path, max_frames: int, progress: Callable[[
             "Walk around what you film: depth is seen only from several places.",
             "MAQ_ERROR_UNREADABLE",
         )
-    chosen = _choose(kept, max_frames)
+    # A cut is one jump between calm pieces; in a fast pan several pairs of frames show nothing in common.
+    calm = float(np.median(changes)) if changes else 0.0
+    cuts = [time_s for time_s, long_s, change in jumps if long_s < 0.5 / rate and change > _CUT * calm]
+    chosen = _choose(kept, min(max_frames, len(kept)), _MIN_RATE * (kept[-1].time_s - kept[0].time_s))
     files = {candidate.file for candidate in chosen}
     for candidate in kept:
         if candidate.file not in files:
@@ -121,10 +141,10 @@ def _keep(best: tuple[float, float, float, Frame] | None, kept: list[_Candidate]
     kept.append(_Candidate(time_s, way, sharp, file, (width, height)))
 
 
-def _choose(kept: list[_Candidate], max_frames: int) -> list[_Candidate]:
+def _choose(kept: list[_Candidate], max_frames: int, min_frames: float) -> list[_Candidate]:
     """The sharpest of each of equal pieces of the way."""
     total = kept[-1].way - kept[0].way
-    count = min(max(round(total / _STEP), _MIN_FRAMES), max_frames, len(kept))
+    count = min(max(round(total / _STEP), round(min_frames), 1), max_frames)
     edges = kept[0].way + total * np.arange(count + 1) / count
     edges[-1] += 1e-9
     chosen = []

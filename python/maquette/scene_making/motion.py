@@ -6,7 +6,9 @@ import numpy as np
 
 SMALL_WIDTH_PX = 160
 _TILE_PX = 40
-_CLEAR_PEAK = 3.0  # of a correlation, over its second highest value elsewhere
+_CLEAR_PEAK = 1.25  # of a correlation, over the highest value elsewhere: 1.2 at most for images of different things
+_ALIKE_PX = 4.0  # between shifts of tiles, as of near and far things
+_MIN_FOUND = 1 / 3  # of the tiles with content
 _MIN_SPREAD = 1.5  # grey levels: a tile with less shows nothing that can be followed
 
 
@@ -26,8 +28,8 @@ def sharpness(grey: np.ndarray) -> float:
 
 
 def motion_between(before: np.ndarray, after: np.ndarray) -> float | None:
-    """How far the image content moved between two images of `shrunk`, as a fraction of the diagonal: of most tiles
-    with content, the upper quartile. None if no tile is found again, as after a cut."""
+    """How far the image content moved between two images of `shrunk`, as a fraction of the diagonal: the upper
+    quartile of tiles with content. None if few tiles are found again, as after a cut or in a fast pan."""
     height, width = before.shape
     rows, columns = height // _TILE_PX, width // _TILE_PX
     size = _TILE_PX
@@ -47,15 +49,19 @@ def motion_between(before: np.ndarray, after: np.ndarray) -> float | None:
             around = [(int(y) + dy) % size for dy in (-1, 0, 1)], [(int(x) + dx) % size for dx in (-1, 0, 1)]
             rest = correlation.copy()
             rest[np.ix_(*around)] = 0
-            if peak <= 0 or peak < _CLEAR_PEAK / 2 * rest.max():
+            if peak <= 0 or peak < _CLEAR_PEAK * rest.max():
                 continue
-            dy, dx = (_subpixel(correlation, int(y), int(x), axis) for axis in (0, 1))
-            shifts.append(float(np.hypot(dy, dx)))
+            shifts.append([_subpixel(correlation, int(y), int(x), axis) for axis in (0, 1)])
     if tiles == 0:
         return 0.0
     if not shifts:
         return None
-    return float(np.quantile(shifts, 0.75) / np.hypot(height, width))
+    found = np.array(shifts)
+    middle = np.median(found, 0)
+    alike = np.linalg.norm(found - middle, axis=1) < max(_ALIKE_PX, 0.5 * float(np.linalg.norm(middle)))
+    if alike.sum() < _MIN_FOUND * tiles:
+        return None
+    return float(np.quantile(np.linalg.norm(found[alike], axis=1), 0.75) / np.hypot(height, width))
 
 
 def _subpixel(correlation: np.ndarray, y: int, x: int, axis: int) -> float:

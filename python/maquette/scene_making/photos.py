@@ -18,7 +18,15 @@ from maquette.scene_making.motion import shrunk
 
 LONG_SIDE_PX = 960
 READABLE = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
-_FOREIGN = {".heic": "HEIC", ".heif": "HEIC", ".avif": "AVIF", ".dng": "RAW", ".cr2": "RAW", ".nef": "RAW", ".arw": "RAW"}
+_FOREIGN = {
+    ".heic": "HEIC",
+    ".heif": "HEIC",
+    ".avif": "AVIF",
+    ".dng": "RAW",
+    ".cr2": "RAW",
+    ".nef": "RAW",
+    ".arw": "RAW",
+}
 _DARK, _BRIGHT = 10, 250  # mean grey levels, of 255
 _PLAIN = 3.0  # standard deviation of grey levels
 _MIN_SIDE_PX = 200

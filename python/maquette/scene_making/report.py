@@ -62,7 +62,9 @@ class SceneReport:
             lines.append("  quality   not measured: with fewer than 6 photos none is held out")
         stages = ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items())
         lines.append(f"  seconds   {sum(self.seconds.values()):.1f}: {stages}")
-        lines.append("  unit      unknown: photos alone do not tell metres; the cameras' mean distance from their middle is 1")
+        lines.append(
+            "  unit      unknown: photos alone do not tell metres; the cameras' mean distance from their middle is 1"
+        )
         lines += [f"  note      {note}" for note in self.notes]
         lines += [f"  left out  {entry.name}: {entry.reason}" for entry in self.left_out[:_SHOWN]]
         if len(self.left_out) > _SHOWN:

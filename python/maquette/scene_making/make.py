@@ -24,7 +24,7 @@ from maquette.scenes import Capture, Scene
 
 Progress = Callable[[float, str], "bool | None"]
 
-MAX_PHOTOS = 60
+MAX_PHOTOS = 50
 _VERSION = 1  # of the results in work folders
 _MIN_FREE_BYTES = 400_000_000
 # Share of each stage in the time, for the progress.

@@ -29,6 +29,7 @@ SETTINGS = {
     "NoveltySettings": ("maq_novelty_config", ("method", "shared_with")),
     "ConcealerSettings": ("maq_concealer_config", ("max_gap_ms", "method")),
     "SceneBuildSettings": ("maq_scene_build_config", ()),
+    "DenseCloudSettings": ("maq_dense_cloud_config", ()),
     "SceneRendererSettings": ("maq_scene_renderer_config", ()),
     "HeadBuilderSettings": ("maq_head_builder_config", ("texture",)),
     "HeadRendererSettings": ("maq_head_renderer_config", ("shading", "use_background", "background")),

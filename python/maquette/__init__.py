@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from maquette.bodies import BODY_ANGLES, Body, BodyClip, BodyMesh, BodyPerson, BodyResult, BodySize, BodySizes
+from maquette.dense_clouds import DenseCloud
 from maquette.densepose import (
     COCO_KEYPOINTS,
     KEYPOINTS,
@@ -65,7 +66,7 @@ from maquette.textures import DensePoseTexture
 __all__ = [
     "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS", "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult",
     "BodySize", "BodySizes", "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve",
-    "Curves", "DensePose", "DensePoseModel", "DensePoseResult", "DensePoseTexture", "Edges", "EdgesFusion",
+    "Curves", "DenseCloud", "DensePose", "DensePoseModel", "DensePoseResult", "DensePoseTexture", "Edges", "EdgesFusion",
     "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto",
     "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget", "Novelty", "NoveltyScore", "Origin",
     "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel",

@@ -233,6 +233,19 @@ class SceneBuildSettings(ModelSettings, total=False):
     use_held_out: int
     """1: also use photos that the capture holds out for comparison; 0: do not."""
 
+    points: Literal["default", "cloud", "depth"]
+    """With "depth", max_points 0 means 1.5 million."""
+
+
+class DenseCloudSettings(TypedDict, total=False):
+    """Fields of maq_dense_cloud_config."""
+
+    threads: int
+    """1 to 64. 0: the large cores, at most 4. The result is the same for any number."""
+
+    max_points: int
+    """Of more points, a random selection is kept. 0: 1.5 million."""
+
 
 class SceneRendererSettings(ModelSettings, total=False):
     """Fields of maq_scene_renderer_config."""

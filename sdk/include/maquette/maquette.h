@@ -111,6 +111,7 @@
 #endif
 #if MAQ_HAS_SCENES
 #include "maquette/capture.h"
+#include "maquette/dense_cloud.h"
 #include "maquette/scene.h"
 #endif
 #if MAQ_HAS_EDGES

@@ -34,6 +34,15 @@ typedef struct maq_scene_renderer maq_scene_renderer;
 /* For maq_scene_build_config.min_variation: all points are view-dependent. */
 #define MAQ_SCENE_VARIATION_ALL (-1)
 
+/* Where the points of maq_scene_build come from. Values never change meaning; new ones are added at the end. */
+typedef enum maq_scene_points {
+  MAQ_SCENE_POINTS_DEFAULT = 0, /* MAQ_SCENE_POINTS_DEPTH if the capture's cloud is sparse: it is COLMAP's own points or
+                                   nerfstudio's sparse_pc.ply. Otherwise MAQ_SCENE_POINTS_CLOUD. */
+  MAQ_SCENE_POINTS_CLOUD = 1,   /* the capture's cloud */
+  MAQ_SCENE_POINTS_DEPTH = 2    /* depth is computed for each photo and fused into a dense cloud (dense_cloud.h). The
+                                   capture's cloud is used if that gives fewer points. */
+} maq_scene_points;
+
 /* All zero is the default. */
 typedef struct maq_scene_build_config {
   uint32_t struct_size;
@@ -58,6 +67,7 @@ typedef struct maq_scene_build_config {
   /* For maq_scene_build only: */
   uint32_t max_views;   /* if there are more photos, an even selection is used. 0: no limit */
   int32_t use_held_out; /* 1: also use photos that the capture holds out for comparison; 0: do not */
+  maq_scene_points points; /* with MAQ_SCENE_POINTS_DEPTH, max_points 0 means 1.5 million */
 } maq_scene_build_config;
 
 typedef struct maq_scene_build_stats {
@@ -75,13 +85,14 @@ typedef struct maq_scene_build_stats {
   double accumulate_ms; /* accumulating the regression */
   double solve_ms;      /* solving the regression */
   double pack_ms;       /* packing the scene */
+  double depth_ms;      /* computing and fusing depth; 0 with MAQ_SCENE_POINTS_CLOUD */
 } maq_scene_build_stats;
 
 /* Fills `config` with the defaults and sets struct_size. `struct_size` is sizeof(maq_scene_build_config) of the caller.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size);
 
-/* Builds a scene from a capture. Unreadable photos are dropped and counted (maq_scene_get_build_stats); points that no
+/* Builds a scene from a capture, of a dense cloud or, if it has only a sparse one, of depth that is computed. Unreadable photos are dropped and counted (maq_scene_get_build_stats); points that no
  * photo saw are dropped. `config` may be NULL for the defaults. The caller owns `*scene`; give it to maq_scene_destroy.
  * The scene needs neither the capture nor its folder. On failure and when cancelled `*scene` stays unchanged.
  * Any thread; several scenes may be built at once. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: every photo is held out).

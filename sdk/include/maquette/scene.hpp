@@ -1,11 +1,13 @@
-// Captures, scenes and their images, for C++17; a part of maquette.hpp.
+// Captures, dense clouds, scenes and their images, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_SCENE_HPP_
 #define MAQUETTE_SCENE_HPP_
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "maquette/capture.h"
+#include "maquette/dense_cloud.h"
 #include "maquette/frame.hpp"
 #include "maquette/image.hpp"
 #include "maquette/scene.h"
@@ -15,6 +17,12 @@ namespace maquette {
 inline maq_scene_build_config default_scene_build_config() {
   maq_scene_build_config config;
   check(maq_scene_build_config_init(&config, sizeof config));
+  return config;
+}
+
+inline maq_dense_cloud_config default_dense_cloud_config() {
+  maq_dense_cloud_config config;
+  check(maq_dense_cloud_config_init(&config, sizeof config));
   return config;
 }
 
@@ -123,6 +131,38 @@ class Scene {
 
  private:
   Owner<maq_scene, maq_scene_destroy> owner_;
+};
+
+class DenseCloud {
+ public:
+  DenseCloud(const Context& context, const maq_dense_cloud_config& config, const std::vector<maq_posed_photo>& photos,
+             const maq_point_cloud& sparse) {
+    maq_dense_cloud* made = nullptr;
+    check(maq_dense_cloud_create(context.get(), &config, photos.data(), uint32_t(photos.size()), &sparse, &made));
+    owner_.reset(made);
+  }
+
+  maq_dense_cloud* get() const { return owner_.get(); }
+
+  // The arrays are the cloud's. `rgb`, unless NULL, is set to the colours, 3 bytes a point.
+  maq_point_cloud points(const uint8_t** rgb = nullptr) const {
+    maq_point_cloud points{};
+    points.struct_size = sizeof points;
+    check(maq_dense_cloud_get_points(get(), &points, rgb));
+    return points;
+  }
+
+  // Returns the depth image of a photo and its camera.
+  std::pair<Frame, maq_pinhole_camera> load_depth(uint32_t index) const {
+    maq_frame* frame = nullptr;
+    maq_pinhole_camera camera{};
+    camera.struct_size = sizeof camera;
+    check(maq_dense_cloud_load_depth(get(), index, &camera, &frame));
+    return {Frame(frame), camera};
+  }
+
+ private:
+  Owner<maq_dense_cloud, maq_dense_cloud_destroy> owner_;
 };
 
 class SceneBuilder {

@@ -43,8 +43,9 @@ constexpr const char* kKinds[] = {"no handle",
                                   "a maq_body_result",
                                   "a maq_body_clip",
                                   "a maq_densepose_texture",
-                                  "a maq_pipeline_result"};
-static_assert(std::size(kKinds) == size_t(HandleKind::kPipelineResult) + 1);
+                                  "a maq_pipeline_result",
+                                  "a maq_dense_cloud"};
+static_assert(std::size(kKinds) == size_t(HandleKind::kDenseCloud) + 1);
 
 // The latest handles that are gone. Without a destructor: an app may destroy handles while the process ends.
 struct RetiredHandles {

@@ -40,7 +40,8 @@ enum class HandleKind : uint32_t {
   kBodyResult,
   kBodyClip,
   kDensePoseTexture,
-  kPipelineResult
+  kPipelineResult,
+  kDenseCloud
 };
 
 class HandleState {

@@ -2,6 +2,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <optional>
@@ -33,6 +34,7 @@ struct BuildOptions {
   uint64_t points = 0;
   uint32_t views = 0;
   bool all_photos = false;
+  maq_scene_points points_from = MAQ_SCENE_POINTS_DEFAULT;
 };
 
 constexpr int kPermille = 1000;
@@ -82,6 +84,7 @@ int build(const BuildOptions& options) {
   config.max_points = options.points;
   config.max_views = options.views;
   config.use_held_out = options.all_photos ? 1 : 0;
+  config.points = options.points_from;
   config.progress_callback = show_progress;
   config.progress_user_data = &progress;
   const maquette::Scene scene = build_or_tell(context, config, capture, options.out);
@@ -99,6 +102,9 @@ int build(const BuildOptions& options) {
   print_output("%s: %" PRIu64 " of %" PRIu64 " points were seen by %u photos; %.1f MB, %.1f bytes a point; %.1f s\n",
                options.out.c_str(), made.point_count, stats.cloud_point_count, stats.view_count, double(bytes) / 1e6,
                double(bytes) / double(made.point_count), total_s);
+  if (stats.depth_ms > 0) {
+    print_output("  the points come from the depth of the photos, computed in %.1f s\n", stats.depth_ms / 1e3);
+  }
   if (stats.unused_view_count > 0) {
     print_output("  %u photos could not be used: unreadable, missing, or they see no point\n", stats.unused_view_count);
   }
@@ -108,6 +114,7 @@ int build(const BuildOptions& options) {
     document["views"] = stats.view_count;
     document["unused_views"] = stats.unused_view_count;
     document["seconds"] = {{"total", total_s},
+                           {"depth", stats.depth_ms / 1e3},
                            {"load", stats.load_ms / 1e3},
                            {"visibility", stats.visibility_ms / 1e3},
                            {"align", stats.align_ms / 1e3},
@@ -127,7 +134,7 @@ int build(const BuildOptions& options) {
 void add_scene_build_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<BuildOptions>();
   CLI::App* command =
-      scene.add_subcommand("build", "Build a scene from a folder with photos, cameras and a point cloud");
+      scene.add_subcommand("build", "Build a scene from a folder with photos, cameras and a dense or sparse point cloud");
   command
       ->add_option("capture", options->capture,
                    "Folder with photos, a point cloud, and a COLMAP model or transforms.json")
@@ -138,6 +145,13 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
       "Folder of the scene bundle; default: MAQ_SCENE_BUNDLE, then the one installed with this program");
   command->add_option("--points", options->points, "Maximum number of points; larger clouds are thinned out evenly")
       ->check(CLI::PositiveNumber);
+  const std::map<std::string, maq_scene_points> sources = {{"cloud", MAQ_SCENE_POINTS_CLOUD},
+                                                           {"depth", MAQ_SCENE_POINTS_DEPTH}};
+  command
+      ->add_option("--points-from", options->points_from,
+                   "cloud: the points of the capture; depth: points that are computed from the photos (default: depth "
+                   "if the capture has only the sparse points of COLMAP or nerfstudio)")
+      ->transform(CLI::CheckedTransformer(sources));
   command->add_option("--views", options->views, "Maximum number of photos, selected evenly")
       ->check(CLI::PositiveNumber);
   command

@@ -19,7 +19,8 @@ BACKEND = BASE - {"nn"} | {"sources"}
 CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
-SCENE = SEEN | {"scene/assembly", "scene/render"}
+FUSED = CAPTURE | {"scene/capture", "scene/stereo"}
+SCENE = SEEN | FUSED | {"scene/fusion", "scene/assembly", "scene/render"}
 DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/keypoints", "densepose/surface",
              "densepose/texture", "densepose/tracking"}  # fmt: skip
 CURVES = {"edges", "edges/curves"}
@@ -90,7 +91,9 @@ MAY_INCLUDE = {
     "scene/networks": CAPTURE,
     "scene/format": CAPTURE | {"scene/networks"},
     "scene/visibility": FITTED - {"scene/capture"},
-    "scene/assembly": SEEN,
+    "scene/stereo": CAPTURE - {"nn"},
+    "scene/fusion": FUSED - {"nn"},
+    "scene/assembly": SEEN | {"scene/fusion"},
     "scene/render": SEEN - {"scene/capture"},
     "sources": BACKEND | {"sources/android", "sources/v4l2", "sources/libcamera", "sources/depthai",
                           "sources/recording", "sources/files", "sources/synthetic"},

@@ -68,13 +68,10 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   options.max_views = config.max_views;
   require_range("config.use_held_out", config.use_held_out, 0, 1);
   options.uses_held_out = config.use_held_out == 1;
-  if (config.progress_callback != nullptr) {
-    settings.progress = [callback = config.progress_callback, user_data = config.progress_user_data](
-                            double done, const std::string& stage) {
-      const auto call = [&] { return callback(user_data, done, stage.c_str()); };
-      return call_app("config.progress_callback", call) != 0;
-    };
-  }
+  const int32_t points = number_in(config.points);
+  require_range("config.points", points, int32_t(MAQ_SCENE_POINTS_DEFAULT), int32_t(MAQ_SCENE_POINTS_DEPTH));
+  options.points = PointSource(points);
+  settings.progress = progress_of(config.progress_callback, config.progress_user_data);
   return settings;
 }
 
@@ -91,6 +88,7 @@ maq_scene_build_stats stats_of(const SceneBuildStats& from) {
   stats.accumulate_ms = from.fitting.accumulate_ms;
   stats.solve_ms = from.fitting.solve_ms;
   stats.pack_ms = from.pack_ms;
+  stats.depth_ms = from.depth_ms;
   return stats;
 }
 
@@ -141,24 +139,11 @@ maq_status maq_scene_builder_create(maq_context* context, const maq_scene_build_
     require_argument(context, "context");
     require_argument(cloud, "cloud");
     require_argument(builder, "builder");
-    require_struct_size("cloud", cloud->struct_size, sizeof(maq_point_cloud));
-    if (cloud->point_count > 0) require_argument(cloud->xyz, "cloud.xyz");
-    if (cloud->point_count > kMaxPoints) {
-      throw Error(MAQ_ERROR_UNSUPPORTED, "The cloud has ", cloud->point_count, " points, over the limit of ",
-                  kMaxPoints, "; make it thinner.");
-    }
     const maq_scene_build_config config = read_config(given, "config", default_scene_build_config());
     BuildSettings settings = checked_settings(config);
+    PointCloud points = points_of_app("cloud", *cloud);
     auto networks = open_scene_networks(context, read_bundle_argument(config.model, "config.model", kSceneBundle),
                                         settings.session);
-    PointCloud points;
-    std::copy_n(cloud->origin, 3, points.origin.begin());
-    points.reserve(cloud->point_count, false);
-    for (uint64_t i = 0; i < cloud->point_count; ++i) {
-      points.x.push_back(cloud->xyz[3 * i]);
-      points.y.push_back(cloud->xyz[3 * i + 1]);
-      points.z.push_back(cloud->xyz[3 * i + 2]);
-    }
     *builder = new maq_scene_builder(std::move(settings.progress), std::move(points), unit_vector(cloud->up),
                                      std::move(networks), settings.options);
     return MAQ_OK;

@@ -5,12 +5,15 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "scene/capture/posed_photo.h"
+#include "scene/fusion/dense_cloud.h"
 
 namespace maq {
 namespace {
 
 // The fraction of the work that is left when all photos are added.
 constexpr double kSolvingFraction = 0.05;
+// The fraction of the work before, where depth is computed.
+constexpr double kDepthFraction = 0.7;
 
 PointCloud thinned(PointCloud cloud, uint64_t max_points) {
   thin_out(cloud, max_points);
@@ -40,6 +43,34 @@ const char* fault_of_photo(maq_status status) {
     case MAQ_ERROR_IMAGE_SIZE: return "photos that are too large for the networks";
     default: return nullptr;
   }
+}
+
+// The part of a progress from `begin` to `end`.
+BuildProgress part_of(const BuildProgress& progress, double begin, double end) {
+  if (!progress) return {};
+  return [=](double done, const std::string& what) { return progress(begin + done * (end - begin), what); };
+}
+
+std::optional<PointCloud> cloud_from_depth(const Capture& capture, const std::vector<const CaptureView*>& views,
+                                           const SceneBuildOptions& options, const BuildProgress& progress) {
+  DenseCloudInput input;
+  input.photos = views.size();
+  input.points = capture.cloud.positions();
+  input.load = [&](size_t index, PosedView& photo) {
+    try {
+      photo.load(*views[index], kDepthLongSidePx);
+    } catch (const Error& error) {
+      if (fault_of_photo(error.status()) == nullptr) throw;
+      return false;  // it is reported when it is added
+    }
+    return true;
+  };
+  DenseCloudOptions wanted;
+  if (options.max_points != 0) wanted.max_points = options.max_points;
+  wanted.threads = options.fitting.threads;
+  std::optional<DenseCloud> made = make_dense_cloud(input, wanted, progress);
+  if (!made) return {};
+  return made->cloud.count() < capture.cloud.count() ? capture.cloud : std::move(made->cloud);
 }
 
 }  // namespace
@@ -100,14 +131,24 @@ SceneBuildStats SceneBuilder::stats() const {
 }
 
 std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,
-                                      const SceneBuildOptions& options, const BuildProgress& progress) {
+                                      const SceneBuildOptions& options, const BuildProgress& whole) {
   const std::vector<const CaptureView*> views = chosen_views(capture, options);
   if (capture.cloud.count() == 0) {
     throw Error(MAQ_ERROR_NOT_FOUND,
                 "The capture has depth images but no point cloud, from which scenes are built; name a "
                 "PLY file in its transforms.json as \"ply_file_path\".");
   }
-  SceneBuilder builder(capture.cloud, capture.up, networks, options);
+  const bool computes_depth =
+      options.points == PointSource::kDefault ? capture.is_sparse : options.points == PointSource::kDepth;
+  double depth_ms = 0;
+  std::optional<PointCloud> cloud;
+  if (computes_depth) {
+    const ScopedTimer timer(depth_ms);
+    cloud = cloud_from_depth(capture, views, options, part_of(whole, 0, kDepthFraction));
+    if (!cloud) return {};
+  }
+  const BuildProgress progress = part_of(whole, computes_depth ? kDepthFraction : 0, 1);
+  SceneBuilder builder(cloud ? std::move(*cloud) : capture.cloud, capture.up, networks, options);
   ImportReport report;
   size_t unusable = 0;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -132,6 +173,7 @@ std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_
   built.dropped = report.list();
   built.stats = builder.stats();
   built.stats.unused_views += unusable;
+  built.stats.depth_ms = depth_ms;
   if (built.stats.views == 0) {
     throw Error(MAQ_ERROR_UNREADABLE, "None of the photos can be used: ", describe(built.dropped), ".");
   }

@@ -13,6 +13,8 @@
 
 namespace maq {
 
+enum class PointSource { kDefault, kCloud, kDepth };
+
 struct SceneBuildOptions {
   FittingOptions fitting;
   ScenePacking packing;
@@ -23,12 +25,14 @@ struct SceneBuildOptions {
   // For captures:
   size_t max_views = 0;        // evenly from all that may be used; 0: all
   bool uses_held_out = false;  // photos that the capture keeps for comparisons
+  PointSource points = PointSource::kDefault;  // kDepth for sparse clouds, kCloud for others
 };
 
 struct SceneBuildStats {
   size_t views = 0, unused_views = 0;  // photos that saw points; that saw none or could not be used
   uint64_t cloud_points = 0;           // after max_points
   uint64_t seen_points = 0;
+  double depth_ms = 0;  // of the depth of photos and its fusion; 0 where the cloud was used
   double load_ms = 0, pack_ms = 0;
   FittingTimes fitting;
 };
@@ -71,7 +75,9 @@ struct BuiltScene {
   std::vector<Dropped> dropped;  // photos that could not be used, or see nothing
 };
 
-// Builds a scene from all photos of a capture, one after the other. Returns nothing if `progress` cancelled. Throws
+// Builds a scene from all photos of a capture, one after the other. With PointSource::kDepth the scene's points come
+// from the depth of the photos, which is computed; of the cloud where that gives fewer. Returns nothing if `progress`
+// cancelled. Throws
 // MAQ_ERROR_INVALID_ARGUMENT also if all photos are held out, MAQ_ERROR_UNREADABLE if none can be used or sees a point,
 // and the errors of SceneBuilder.
 std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_ptr<SceneNetworks>& networks,

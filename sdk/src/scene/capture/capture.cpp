@@ -162,8 +162,9 @@ Capture open_colmap(const std::string& folder, const ColmapFiles& files) {
   capture.views = views_of(folder_of_photos(folder, photos), photos, folder, report);
   capture.up = up_of_cameras(rotations_of(capture.views));
   const std::string dense = folder + "/fused.ply";
-  capture.cloud = file_exists(dense) ? read_ply_file(dense, middle_of(capture.views), report)
-                                     : read_colmap_points(files, middle_of(capture.views), report);
+  capture.is_sparse = !file_exists(dense);
+  capture.cloud = capture.is_sparse ? read_colmap_points(files, middle_of(capture.views), report)
+                                    : read_ply_file(dense, middle_of(capture.views), report);
   capture.dropped = report.list();
   return capture;
 }
@@ -192,6 +193,9 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
   }
   capture.up = up_by_convention({0, 0, 1}, rotations_of(capture.views));
   if (!cloud.empty()) capture.cloud = read_ply_file(cloud, middle_of(capture.views), report);
+  // The name that nerfstudio gives to COLMAP's points.
+  const std::string name = "sparse_pc.ply";
+  capture.is_sparse = cloud.size() >= name.size() && cloud.compare(cloud.size() - name.size(), name.size(), name) == 0;
   capture.dropped = report.list();
   return capture;
 }

@@ -45,6 +45,18 @@ void PosedView::load(const ImageView& image, const Lens& lens, const PinholeCame
   shrink_to(long_side_px);
 }
 
+void PosedView::hide_black(const ImageView& mask) {
+  if (mask.width_px != camera_.width_px || mask.height_px != camera_.height_px) {
+    throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The mask has ", mask.width_px, " x ", mask.height_px,
+                " pixels, but its photo has ", camera_.width_px, " x ", camera_.height_px, ".");
+  }
+  const size_t width = size_t(mask.width_px);
+  if (valid_.empty()) valid_.assign(width * size_t(mask.height_px), 255);
+  for (size_t i = 0; i < valid_.size(); ++i) {
+    if (mask.planes[0].data[i / width * mask.planes[0].stride_bytes + i % width * 3 + 1] < 128) valid_[i] = 0;
+  }
+}
+
 void PosedView::shrink_to(int long_side_px) {
   const int long_side = std::max(camera_.width_px, camera_.height_px);
   if (long_side_px == 0 || long_side <= long_side_px) return;

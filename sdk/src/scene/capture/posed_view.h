@@ -21,6 +21,9 @@ class PosedView {
   // for a distortion that is not invertible, and the errors of copy_pixels().
   void load(const ImageView& image, const Lens& lens, const PinholeCamera& pose, int long_side_px);
 
+  // Makes pixels invalid where `mask`, a BGR image of the size of image(), is darker than half.
+  void hide_black(const ImageView& mask);
+
   const ImageView& image() const { return *image_; }
   const uint8_t* valid() const {
     return valid_.empty() ? nullptr : valid_.data();

@@ -1,0 +1,107 @@
+#include "scene/stereo/view_selection.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace maq {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+constexpr double kBestAngle = 10, kAngleWidth = 8;  // degrees between two cameras at a point
+constexpr double kMinAngle = 0.1;                   // below it depth cannot be measured
+constexpr size_t kMinShared = 12;
+// Points of a larger cloud are taken at even steps; more would not change the order of neighbours.
+constexpr size_t kMinSample = 512, kMaxSample = 4096;
+constexpr double kPairTests = 3e8;  // of a camera, a camera and a point
+constexpr double kNearFraction = 0.01, kNearMargin = 0.9, kFarMargin = 1.1;
+
+struct Seen {
+  uint32_t point;
+  double depth;
+};
+
+std::vector<Seen> points_in_image(const PinholeCamera& camera, const std::vector<std::array<double, 3>>& points) {
+  std::vector<Seen> seen;
+  const auto& r = camera.rotation;
+  for (size_t i = 0; i < points.size(); ++i) {
+    double at[3] = {0, 0, 0};
+    for (size_t k = 0; k < 3; ++k) {
+      const double away = points[i][k] - camera.centre[k];
+      for (size_t row = 0; row < 3; ++row) at[row] += r[3 * row + k] * away;
+    }
+    if (!(at[2] > 0)) continue;
+    const double x = at[0] / at[2] * camera.fx_px + camera.cx_px, y = at[1] / at[2] * camera.fy_px + camera.cy_px;
+    if (x >= 0 && y >= 0 && x <= camera.width_px - 1 && y <= camera.height_px - 1) seen.push_back({uint32_t(i), at[2]});
+  }
+  return seen;
+}
+
+double value_at(std::vector<double>& values, double fraction) {
+  const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// 0 for cameras that are no neighbours.
+double neighbour_score(const PinholeCamera& a, const PinholeCamera& b, const std::vector<Seen>& of_a,
+                       const std::vector<Seen>& of_b, const std::vector<std::array<double, 3>>& points) {
+  std::vector<double> cosines;
+  for (size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
+    if (of_a[i].point != of_b[j].point) {
+      ++(of_a[i].point < of_b[j].point ? i : j);
+      continue;
+    }
+    const auto& at = points[of_a[i].point];
+    double dot = 0, length_a = 0, length_b = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double to_a = a.centre[k] - at[k], to_b = b.centre[k] - at[k];
+      dot += to_a * to_b;
+      length_a += to_a * to_a;
+      length_b += to_b * to_b;
+    }
+    cosines.push_back(dot / std::sqrt(length_a * length_b));
+    ++i, ++j;
+  }
+  if (cosines.size() < kMinShared) return 0;
+  const double angle = std::acos(std::min(std::max(value_at(cosines, 0.5), -1.0), 1.0)) * kDegrees;
+  if (!(angle >= kMinAngle)) return 0;
+  const double off = (angle - kBestAngle) / kAngleWidth;
+  return double(cosines.size()) * std::exp(-off * off);
+}
+
+}  // namespace
+
+std::vector<ViewPlan> plan_views(const std::vector<PinholeCamera>& cameras, const PointPositions& cloud,
+                                 size_t max_neighbours) {
+  const size_t views = cameras.size();
+  const double affordable = kPairTests / std::max(1.0, double(views) * double(views));
+  const size_t most = size_t(std::min(std::max(affordable, double(kMinSample)), double(kMaxSample)));
+  const size_t count = std::min(cloud.count, most);
+  std::vector<std::array<double, 3>> points(count);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t from = size_t(uint64_t(i) * cloud.count / count);
+    points[i] = {cloud.origin[0] + double(cloud.x[from]), cloud.origin[1] + double(cloud.y[from]),
+                 cloud.origin[2] + double(cloud.z[from])};
+  }
+  std::vector<std::vector<Seen>> seen;
+  for (const PinholeCamera& camera : cameras) seen.push_back(points_in_image(camera, points));
+  std::vector<ViewPlan> plans(views);
+  for (size_t i = 0; i < views; ++i) {
+    if (seen[i].size() < kMinShared) continue;
+    std::vector<std::pair<double, uint32_t>> scores;
+    for (size_t j = 0; j < views; ++j) {
+      const double score = j == i ? 0 : neighbour_score(cameras[i], cameras[j], seen[i], seen[j], points);
+      if (score > 0) scores.emplace_back(-score, uint32_t(j));
+    }
+    std::sort(scores.begin(), scores.end());
+    if (scores.size() > max_neighbours) scores.resize(max_neighbours);
+    for (const auto& [score, j] : scores) plans[i].neighbours.push_back(j);
+    std::vector<double> depths;
+    for (const Seen& point : seen[i]) depths.push_back(point.depth);
+    plans[i].near = kNearMargin * value_at(depths, kNearFraction);
+    plans[i].far = kFarMargin * value_at(depths, 1 - kNearFraction);
+  }
+  return plans;
+}
+
+}  // namespace maq

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,51 +20,24 @@ _FEW, _SOME, _MANY = 6, 12, 24  # photos: below, 0, 1 and 2 are held out; from t
 _MAX_ERROR_PX = 2.0  # of sparse points that are used
 
 
-@dataclass(frozen=True, eq=False)
-class SparsePoints:
-    """xyz: float64 [P, 3] in the capture's world; rgb: uint8 [P, 3]. seen: for each photo of the capture, in its order,
-    numbers of the points in it."""
-
-    xyz: np.ndarray
-    rgb: np.ndarray
-    seen: list[np.ndarray]
-
-    def save(self, path: Path) -> None:
-        counts = np.array([len(numbers) for numbers in self.seen])
-        np.savez(
-            path, xyz=self.xyz, rgb=self.rgb, counts=counts, seen=np.concatenate([*self.seen, []]).astype(np.int64)
-        )
-
-    @staticmethod
-    def load(path: Path) -> SparsePoints:
-        with np.load(path) as file:
-            seen = np.split(file["seen"], np.cumsum(file["counts"])[:-1])
-            return SparsePoints(file["xyz"], file["rgb"], seen)
-
-
 def held_out_of(count: int) -> list[int]:
     """Numbers of the photos that only the comparison uses, evenly spread and never the first or last."""
     number = 0 if count < _FEW else 1 if count < _SOME else 2 if count < _MANY else 3
     return [round((k + 0.5) * count / number) for k in range(number)]
 
 
-def write_capture(model: Any, photos: Sequence[Photo], source: Path, folder: Path) -> tuple[SparsePoints, list[str]]:
+def write_capture(model: Any, photos: Sequence[Photo], source: Path, folder: Path) -> np.ndarray:
     """Writes photos, transforms.json and the sparse cloud of a pycolmap.Reconstruction to an empty folder. Returns the
-    points, and the files of held-out photos. Raises OSError, MaquetteError."""
+    cloud, float32 [P, 3] in the capture's world. Raises OSError, MaquetteError."""
     images = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
     (folder / "images").mkdir()
     for image in images:
         shutil.copyfile(source / image.name, folder / "images" / image.name)
     turn, scale, middle = _upright(model, folder, [image.projection_center() for image in images])
     chosen = [k for k, point in model.points3D.items() if point.error <= _MAX_ERROR_PX] or list(model.points3D)
-    number = {k: n for n, k in enumerate(chosen)}
     xyz = np.array([model.points3D[k].xyz for k in chosen]).reshape(-1, 3)
-    xyz = scale * (xyz - middle) @ turn.T
+    xyz = (scale * (xyz - middle) @ turn.T).astype(np.float32)
     rgb = np.array([model.points3D[k].color for k in chosen], np.uint8).reshape(-1, 3)
-    seen = []
-    for image in images:
-        ids = {point.point3D_id for point in image.points2D if point.has_point3D()}
-        seen.append(np.array(sorted(number[k] for k in ids if k in number), np.int64))
     held_out = [f"images/{images[k].name}" for k in held_out_of(len(images))]
     names = [f"images/{image.name}" for image in images]
     origins = {photo.file: photo.origin for photo in photos}
@@ -83,9 +55,9 @@ def write_capture(model: Any, photos: Sequence[Photo], source: Path, folder: Pat
         "test_filenames": held_out,
         "unit": "unknown: the mean distance of the cameras from their middle is 1",
     }
-    write_cloud(folder / CLOUD, xyz.astype(np.float32), rgb)
+    write_cloud(folder / CLOUD, xyz, rgb)
     write_atomically(folder / "transforms.json", json.dumps(table, indent=1) + "\n")
-    return SparsePoints(xyz, rgb, seen), held_out
+    return xyz
 
 
 def _upright(model: Any, folder: Path, centres: list[np.ndarray]) -> tuple[np.ndarray, float, np.ndarray]:

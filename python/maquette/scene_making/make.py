@@ -11,9 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from maquette.native import MaquetteError
 from maquette.scene_making.cameras import pose, require_pycolmap
-from maquette.scene_making.capture import CLOUD, SparsePoints, write_capture, write_cloud
+from maquette.scene_making.capture import CLOUD, write_capture, write_cloud
 from maquette.scene_making.depth import dense_cloud
 from maquette.scene_making.film import ENDINGS, is_film, prepare_film
 from maquette.scene_making.photos import LeftOut, Prepared, photo_files, prepare_photos
@@ -29,7 +31,8 @@ _VERSION = 1  # of the results in work folders
 _MIN_FREE_BYTES = 400_000_000
 # Share of each stage in the time, for the progress.
 _STAGES = {"photos": 0.1, "cameras": 0.3, "depth": 0.45, "scene": 0.1, "preview": 0.05}
-_UNNEEDED = ("photos", "database.db", "database.db-shm", "database.db-wal", "pairs.txt", "sparse.npz")
+_SPARSE = "sparse.npy"
+_UNNEEDED = ("photos", "database.db", "database.db-shm", "database.db-wal", "pairs.txt", _SPARSE)
 
 
 def make_scene(
@@ -181,8 +184,8 @@ class _Job:
     def _cameras(self, prepared: Prepared) -> dict[str, Any]:
         posed = pose(self.work.path, prepared.photos, prepared.ordered, self.source, self.threads, self.tell)
         folder = self.work.fresh_folder("capture")
-        sparse, _ = write_capture(posed.model, prepared.photos, self.work.path / "photos", folder)
-        sparse.save(self.work.path / "sparse.npz")
+        sparse = write_capture(posed.model, prepared.photos, self.work.path / "photos", folder)
+        np.save(self.work.path / _SPARSE, sparse)
         count = posed.model.num_reg_images()
         notes = []
         if count < 0.5 * len(prepared.photos):
@@ -200,7 +203,7 @@ class _Job:
         }
 
     def _depth(self) -> dict[str, Any]:
-        sparse = SparsePoints.load(self.work.path / "sparse.npz")
+        sparse = np.load(self.work.path / _SPARSE)
         with Capture(self.capture) as capture:
             told = "finding depth"
             xyz, rgb = dense_cloud(capture, sparse, self.threads, lambda done: self.tell(done, told))

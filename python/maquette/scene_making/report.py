@@ -16,9 +16,9 @@ _SHOWN = 20  # photos left out, in the text
 
 @dataclass(frozen=True)
 class SceneReport:
-    """scene, preview, capture: paths of the results. found: photos or frames looked at; used: of these, photos that were
-    matched; posed: of these, photos with a camera. left_out: photos that were not used, and why. compared: photos beside
-    the scene's views. seconds: of each stage; of stages that an earlier run ended, too. notes: sentences for the user."""
+    """scene, preview, capture: paths of the results. found: photos or frames looked at; used: of these, photos that
+    were matched; posed: of these, photos with a camera. left_out: photos that were not used, and why. compared: photos
+    beside the scene's views. seconds: of each stage, also if an earlier run ended it. notes: sentences for the user."""
 
     source: str
     scene: str

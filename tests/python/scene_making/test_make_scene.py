@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import ClassVar
 
 import maquette
 import numpy as np
@@ -38,7 +39,7 @@ def room(tmp_path_factory):
 @pytest.fixture
 def sparse_cloud(monkeypatch):
     """The sparse points in place of dense ones: depth has tests of its own."""
-    monkeypatch.setattr(make, "dense_cloud", lambda capture, sparse, *_: (sparse.xyz.astype(np.float32), sparse.rgb))
+    monkeypatch.setattr(make, "dense_cloud", lambda _, sparse, *__: (sparse, np.full(sparse.shape, 128, np.uint8)))
 
 
 def similarity(found: np.ndarray, true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -209,7 +210,7 @@ def test_a_full_disk_is_said_before_and_during_the_work(tmp_path, monkeypatch):
     film = write_film(tmp_path / "film.avi", [window(texture(), 8 * k) for k in range(4)])
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(make.shutil, "disk_usage", lambda _: usage._replace(free=10))
-    with pytest.raises(maquette.MaquetteError, match="disk of .* is full"):
+    with pytest.raises(maquette.MaquetteError, match=r"disk of .* is full"):
         maquette.make_scene(film, tmp_path / "a.maqs")
     monkeypatch.undo()
     monkeypatch.setattr(make, "require_pycolmap", lambda: None)
@@ -218,7 +219,7 @@ def test_a_full_disk_is_said_before_and_during_the_work(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(WorkFolder, "finish", full)
-    with pytest.raises(maquette.MaquetteError, match="disk of .* is full"):
+    with pytest.raises(maquette.MaquetteError, match=r"disk of .* is full"):
         maquette.make_scene(film, tmp_path / "a.maqs")
 
 
@@ -242,8 +243,8 @@ def test_reasons_are_told_apart():
     """Without a mapper: what the database says about photos that have no camera."""
 
     class Database:
-        keypoints = [900, 900, 900, 20, 900, 900, 900, 900]
-        inliers = {(0, 1): 300, (1, 2): 300, (2, 5): 40, (6, 7): 200}
+        keypoints: ClassVar = [900, 900, 900, 20, 900, 900, 900, 900]
+        inliers: ClassVar = {(0, 1): 300, (1, 2): 300, (2, 5): 40, (6, 7): 200}
         turned_pairs = 0
         groups = cameras.Matches.groups
         best_partner = cameras.Matches.best_partner
@@ -255,7 +256,7 @@ def test_reasons_are_told_apart():
             self.name = name
 
     class Model:
-        images = {k: Posed(f"{k}.jpg") for k in range(3)}
+        images: ClassVar = {k: Posed(f"{k}.jpg") for k in range(3)}
 
     photos = [cameras.Photo(f"{k}.jpg", f"photo {k}", 10, 10, "") for k in range(8)]
     reasons = {entry.name: entry.reason for entry in cameras._reasons(photos, Database(), Model())}

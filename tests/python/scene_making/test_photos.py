@@ -81,8 +81,15 @@ def test_what_cannot_be_used_is_named_with_the_reason(folder, tmp_path):
     assert [photo.origin for photo in result.photos] == ["good copy.jpg"]
     reasons = {entry.name: entry.reason for entry in result.left_out}
     assert set(reasons) == {"good.jpg", "black.jpg", "white.png", "tiny.png", "broken.jpg", "phone.HEIC"}
-    for name, word in (("good.jpg", "same picture as good copy.jpg"), ("black.jpg", "black"), ("white.png", "overexposed"),
-                       ("tiny.png", "60 x 60"), ("broken.jpg", "cannot be read"), ("phone.HEIC", "JPEG")):  # fmt: skip
+    words = {
+        "good.jpg": "same picture as good copy.jpg",
+        "black.jpg": "black",
+        "white.png": "overexposed",
+        "tiny.png": "60 x 60",
+        "broken.jpg": "cannot be read",
+        "phone.HEIC": "JPEG",
+    }
+    for name, word in words.items():
         assert word in reasons[name]
 
 

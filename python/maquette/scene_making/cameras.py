@@ -38,7 +38,8 @@ def require_pycolmap() -> None:
         import pycolmap
     except ImportError as error:
         raise MaquetteError(
-            f"A film or photos need pycolmap, which finds the cameras: pip install 'maquette[scenes]' ({error})",
+            "A film or photos need pycolmap, which finds the cameras (Python 3.10 or newer, x86-64): pip install "
+            f"'maquette[scenes]' ({error})",
             "MAQ_ERROR_NOT_FOUND",
         ) from None
     pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value

@@ -1,4 +1,4 @@
-"""What the EXIF data of a JPEG file says about the camera: its model and focal length."""
+"""Reads the model and the focal length of the camera from the EXIF data of a JPEG file."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def match(
 
 
 class Matches:
-    """What the database says: keypoints of each photo, inliers and kind of geometry of each pair."""
+    """Content of the database: keypoints of each photo, inliers of each pair, and pairs without depth."""
 
     def __init__(self, database: Path, photos: Sequence[Photo]) -> None:
         import pycolmap

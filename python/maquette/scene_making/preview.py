@@ -27,7 +27,7 @@ class Compared:
 
 
 def psnr_db(image: np.ndarray, truth: np.ndarray) -> float:
-    """Of uint8 images; at most 100."""
+    """Returns the PSNR of uint8 images, at most 100."""
     error = float(np.mean((image.astype(np.float64) - truth) ** 2))
     return min(100.0, 10 * math.log10(255**2 / error)) if error > 0 else 100.0
 

@@ -1,4 +1,4 @@
-"""What was made of a film or photos: the return value of `make_scene`, as JSON and as text."""
+"""The report about a scene: the return value of `make_scene`, as JSON and as text."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class WorkFolder:
         self._save()
 
     def result(self, stage: str) -> dict[str, Any] | None:
-        """What `finish` was given; None if the stage has not ended."""
+        """Returns the result that `finish` was given; None if the stage has not ended."""
         return self._known["stages"].get(stage)
 
     def finish(self, stage: str, result: dict[str, Any]) -> None:

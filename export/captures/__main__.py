@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from export.captures.dense import POINTS, WITNESSES
+from export.captures.dense import POINTS
 from export.captures.originals import ORIGINALS
 from export.captures.structure import CaptureError
 from export.photos.packages import NetworkError, PackageError, load_packages
@@ -30,8 +30,6 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
     parser.add_argument("--out", type=Path, default=Path(".data/places/real"), help="default: %(default)s")
     parser.add_argument("--points", type=int, default=POINTS, help="at most so many; default: %(default)s")
-    parser.add_argument("--witnesses", type=int, default=WITNESSES,
-                        help="other photos that a point must be found in; default: %(default)s")  # fmt: skip
     parser.add_argument("--force", action="store_true", help="make again what is already there")
     arguments = parser.parse_args(argv)
     known = [original.name for original in ORIGINALS]
@@ -52,7 +50,7 @@ def main(argv: list[str] | None = None) -> int:
                 from export.captures.folder import make
 
                 folder.parent.mkdir(parents=True, exist_ok=True)
-                photos, posed, points = make(original, folder, arguments.points, arguments.witnesses)
+                photos, posed, points = make(original, folder, arguments.points)
             except ModuleNotFoundError as error:
                 print(f"{error}. Run: scripts/make-venv.sh captures", file=sys.stderr)
                 return 1

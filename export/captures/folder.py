@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from export.camera import Camera
-from export.captures.dense import POINTS, WITNESSES, depth_maps, fused
+from export.captures.dense import POINTS, dense_cloud
 from export.captures.originals import Original
 from export.captures.structure import pose, up_of_cameras, write_photos
 from export.photos.packages import load_packages
@@ -23,45 +22,20 @@ DEPTH_STEPS = 60_000  # of a stored depth, for the farthest of a capture
 _TO_OPENGL = np.diag([1.0, -1.0, -1.0])
 
 
-@dataclass(frozen=True, eq=False)
-class Sources:
-    """Input of a point cloud: cameras, photos uint8 [H, W, 3], blue first, and depth maps, without held-out photos.
-    turn, scale, middle: from COLMAP's world to the capture's world."""
-
-    cameras: list[Camera]
-    images: list[np.ndarray]
-    depths: list[np.ndarray]
-    turn: np.ndarray
-    scale: float
-    middle: np.ndarray
-
-    def write_clouds(self, folder: Path, xyz: np.ndarray, rgb: np.ndarray) -> None:
-        """Writes the cloud in the capture's world and in COLMAP's world."""
-        write_ply(folder / "cloud.ply", xyz, rgb)
-        in_model = ((xyz @ self.turn) / self.scale + self.middle).astype(np.float32)
-        write_ply(folder / "model/fused.ply", in_model, rgb)
-
-
-def make(
-    original: Original, folder: Path, max_points: int = POINTS, min_witnesses: int = WITNESSES
-) -> tuple[int, int, int]:
+def make(original: Original, folder: Path, max_points: int = POINTS) -> tuple[int, int, int]:
     """Writes the folder atomically; gives the numbers of photos, of those posed, and of points.
 
     Raises PackageError and CaptureError.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
-    photos, posed, sources = pose_and_sweep(original, partial)
-    xyz, rgb = fused(sources.cameras, sources.images, sources.depths, max_points, min_witnesses)
-    sources.write_clouds(partial, xyz, rgb)
+    counts = _write(original, partial, max_points)
     shutil.rmtree(folder, ignore_errors=True)
     partial.rename(folder)
-    return photos, posed, len(xyz)
+    return counts
 
 
-def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources]:
-    """Writes all of the folder but its clouds; gives the numbers of photos and of those posed, and what clouds are made
-    of. Raises PackageError and CaptureError."""
+def _write(original: Original, partial: Path, max_points: int) -> tuple[int, int, int]:
     import pycolmap  # of the extra `captures`
 
     photos = original.photos()
@@ -75,14 +49,13 @@ def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources
     cameras = [_camera(view) for view in views]
     turn, scale, middle = _placed_upright(cameras)
     cameras = [_moved(camera, turn, scale, middle) for camera in cameras]
-    places = {k: scale * turn @ (point.xyz - middle) for k, point in straight.points3D.items()}
-    seen = [{p.point3D_id for p in view.points2D if p.has_point3D()} for view in views]
+    sparse = np.array([scale * turn @ (point.xyz - middle) for point in straight.points3D.values()])
     images = [cv2.imread(str(flat / "images" / view.name)) for view in views]
     masks = [_flat_mask(colmap, model, view.name, camera) for view, camera in zip(views, cameras, strict=True)]
     held_out = [k for k in range(len(views)) if k % HELD_OUT_EVERY == HELD_OUT_EVERY // 2]
     sources = [k for k in range(len(views)) if k not in held_out]
-    of_sources = [[part[k] for k in sources] for part in (cameras, images, masks, seen)]
-    depths = depth_maps(*of_sources, places)
+    of_sources = [[part[k] for k in sources] for part in (cameras, images, masks)]
+    depths, xyz, rgb = dense_cloud(*of_sources, sparse, max_points)
     names = [f"images/{view.name}" for view in views]
     depth_names, depth_unit = write_depths(partial, [names[k] for k in sources], depths)
     (flat / "images").rename(partial / "images")
@@ -105,7 +78,10 @@ def pose_and_sweep(original: Original, partial: Path) -> tuple[int, int, Sources
         "reprojection_error_px": float(model.compute_mean_reprojection_error()),
     }
     (partial / "transforms.json").write_text(json.dumps(table, indent=1) + "\n")
-    return len(photos), len(views), Sources(of_sources[0], of_sources[1], depths, turn, scale, middle)
+    write_ply(partial / "cloud.ply", xyz, rgb)
+    in_model = ((xyz @ turn) / scale + middle).astype(np.float32)
+    write_ply(partial / "model/fused.ply", in_model, rgb)
+    return len(photos), len(views), len(xyz)
 
 
 def write_depths(folder: Path, names: list[str], depths: list[np.ndarray]) -> tuple[dict[str, dict[str, str]], float]:

@@ -244,7 +244,7 @@ class DenseCloudSettings(TypedDict, total=False):
     """1 to 64. 0: the large cores, at most 4. The result is the same for any number."""
 
     max_points: int
-    """Of more points, a random selection is kept. 0: 1.5 million."""
+    """If there are more points, a random selection is kept. 0: 1.5 million."""
 
 
 class SceneRendererSettings(ModelSettings, total=False):

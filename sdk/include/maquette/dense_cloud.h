@@ -1,5 +1,5 @@
-/* Dense clouds from posed photos and a sparse cloud: the depth of each photo is computed, and the depth images are fused
- * (docs/guide/scene.md).
+/* Dense clouds from posed photos and a sparse cloud: the depth of each photo is computed, and the depth images are
+ * fused (docs/guide/scene.md).
  *
  *   maq_dense_cloud_create(context, NULL, photos, photo_count, &sparse, &dense);
  *   maq_dense_cloud_get_points(dense, &points, &rgb);
@@ -31,7 +31,7 @@ typedef struct maq_posed_photo {
 typedef struct maq_dense_cloud_config {
   uint32_t struct_size;
   int32_t threads;     /* 1 to 64. 0: the large cores, at most 4. The result is the same for any number. */
-  uint64_t max_points; /* of more points, a random selection is kept. 0: 1.5 million */
+  uint64_t max_points; /* if there are more points, a random selection is kept. 0: 1.5 million */
   maq_progress_callback progress_callback; /* of maq_dense_cloud_create; may be NULL */
   void* progress_user_data;                /* passed to progress_callback */
 } maq_dense_cloud_config;
@@ -41,8 +41,8 @@ typedef struct maq_dense_cloud_config {
 MAQ_API maq_status maq_dense_cloud_config_init(maq_dense_cloud_config* config, uint32_t struct_size);
 
 /* Computes a dense cloud. `photos` has `photo_count` entries, 1 to 100,000, each with its struct_size. `sparse` has
- * points between the photos, such as an AR session or COLMAP finds: a photo needs 12 of them in its image, and another
- * photo that sees them from elsewhere; otherwise it has no depth. `up` of `sparse` is not used, and may be zero.
+ * points of the scene, such as an AR session or COLMAP finds. A photo without 12 of them in its image has no depth.
+ * Neither has a photo if no other photo sees these points from elsewhere. `up` of `sparse` is only copied.
  * `config` may be NULL for the defaults. Takes some 256 bytes for each pixel of one photo, and 6 for each pixel of all
  * photos. The caller owns `*cloud`; give it to maq_dense_cloud_destroy. On failure and when cancelled `*cloud` stays
  * unchanged.

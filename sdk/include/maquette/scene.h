@@ -65,8 +65,8 @@ typedef struct maq_scene_build_config {
   maq_progress_callback progress_callback; /* of maq_scene_build and maq_scene_builder_add_view; may be NULL */
   void* progress_user_data;                /* passed to progress_callback */
   /* For maq_scene_build only: */
-  uint32_t max_views;   /* if there are more photos, an even selection is used. 0: no limit */
-  int32_t use_held_out; /* 1: also use photos that the capture holds out for comparison; 0: do not */
+  uint32_t max_views;      /* if there are more photos, an even selection is used. 0: no limit */
+  int32_t use_held_out;    /* 1: also use photos that the capture holds out for comparison; 0: do not */
   maq_scene_points points; /* with MAQ_SCENE_POINTS_DEPTH, max_points 0 means 1.5 million */
 } maq_scene_build_config;
 
@@ -92,14 +92,15 @@ typedef struct maq_scene_build_stats {
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT. Does not block. */
 MAQ_API maq_status maq_scene_build_config_init(maq_scene_build_config* config, uint32_t struct_size);
 
-/* Builds a scene from a capture, of a dense cloud or, if it has only a sparse one, of depth that is computed. Unreadable photos are dropped and counted (maq_scene_get_build_stats); points that no
- * photo saw are dropped. `config` may be NULL for the defaults. The caller owns `*scene`; give it to maq_scene_destroy.
- * The scene needs neither the capture nor its folder. On failure and when cancelled `*scene` stays unchanged.
- * Any thread; several scenes may be built at once. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: every photo is held out).
- * MAQ_ERROR_NOT_FOUND. MAQ_ERROR_BAD_BUNDLE. MAQ_ERROR_UNSUPPORTED (a bundle of another task).
- * MAQ_ERROR_RUNTIME_LIBRARY. MAQ_ERROR_UNREADABLE (no photo is usable or sees a point). MAQ_ERROR_OUT_OF_MEMORY (over
- * max_memory_bytes, or over the machine's memory). MAQ_ERROR_INFERENCE. MAQ_CANCELLED (by the progress callback).
- * Blocks until the scene is built. */
+/* Builds a scene from a capture, of a dense cloud or, if it has only a sparse one, of depth that is computed.
+ * Unreadable photos are dropped and counted (maq_scene_get_build_stats); points that no photo saw are dropped. `config`
+ * may be NULL for the defaults. The caller owns `*scene`; give it to maq_scene_destroy. The scene needs neither the
+ * capture nor its folder. On failure and when cancelled `*scene` stays unchanged. Any thread; several scenes may be
+ * built at once. Errors: MAQ_ERROR_INVALID_ARGUMENT (also: every photo is held out). MAQ_ERROR_NOT_FOUND.
+ * MAQ_ERROR_BAD_BUNDLE. MAQ_ERROR_UNSUPPORTED (a bundle of another task). MAQ_ERROR_RUNTIME_LIBRARY.
+ * MAQ_ERROR_UNREADABLE (no photo is usable or sees a point). MAQ_ERROR_OUT_OF_MEMORY (over max_memory_bytes, or over
+ * the machine's memory). MAQ_ERROR_INFERENCE. MAQ_CANCELLED (by the progress callback). Blocks until the scene is
+ * built. */
 MAQ_API maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* config,
                                    const maq_capture* capture, maq_scene** scene);
 

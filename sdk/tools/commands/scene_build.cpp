@@ -133,8 +133,8 @@ int build(const BuildOptions& options) {
 
 void add_scene_build_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<BuildOptions>();
-  CLI::App* command =
-      scene.add_subcommand("build", "Build a scene from a folder with photos, cameras and a dense or sparse point cloud");
+  CLI::App* command = scene.add_subcommand(
+      "build", "Build a scene from a folder with photos, cameras and a dense or sparse point cloud");
   command
       ->add_option("capture", options->capture,
                    "Folder with photos, a point cloud, and a COLMAP model or transforms.json")
@@ -149,8 +149,8 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
                                                            {"depth", MAQ_SCENE_POINTS_DEPTH}};
   command
       ->add_option("--points-from", options->points_from,
-                   "cloud: the points of the capture; depth: points that are computed from the photos (default: depth "
-                   "if the capture has only the sparse points of COLMAP or nerfstudio)")
+                   "cloud: the points of the capture; depth: points that are computed from the photos. Default: depth "
+                   "if the capture has only the sparse points of COLMAP or nerfstudio")
       ->transform(CLI::CheckedTransformer(sources));
   command->add_option("--views", options->views, "Maximum number of photos, selected evenly")
       ->check(CLI::PositiveNumber);

@@ -15,7 +15,7 @@ using textured_scene::camera_at;
 using textured_scene::turned;
 
 DepthMap map_of(const textured_scene::Surface& surface, const maq::PinholeCamera& camera) {
-  const textured_scene::View view = view_of(surface, camera);
+  const textured_scene::TracedView view = textured_scene::view_of(surface, camera);
   return {camera, {view.depth.begin(), view.depth.end()}, {}};
 }
 
@@ -25,7 +25,8 @@ std::vector<DepthMap> noisy_maps(size_t count) {
   uint32_t random = 1;
   for (size_t i = 0; i < count; ++i) {
     const double across = double(i) - 0.5 * double(count);
-    maps.push_back(map_of(textured_scene::plane({0.2, 0.1, 1}, 2), turned(camera_at({0.1 * across, 0.02 * across, 0}, 64, 48), 0.04 * across)));
+    maps.push_back(map_of(textured_scene::plane({0.2, 0.1, 1}, 2),
+                          turned(camera_at({0.1 * across, 0.02 * across, 0}, 64, 48), 0.04 * across)));
     for (float& depth : maps.back().depth) {
       random = random * 1664525u + 1013904223u;
       const uint32_t kind = random >> 24;
@@ -92,7 +93,7 @@ TEST(DepthFusion, AgreesWithTheRuleInDouble) {
       agreeing[m].push_back(votes);
     }
   }
-  for (const int trust : {1, 2, 4}) {
+  for (const int trust : {0, 1, 2, 4}) {
     FusionRule rule;
     rule.min_trust = trust;
     const auto kept = set_of(fuse(maps, rule));
@@ -147,9 +148,8 @@ TEST(DepthFusion, AChoiceOfPointsIsEvenOverPixelsAndTheSameForAnyNumberOfThreads
   ASSERT_EQ(some.size(), 2000u);
   for (const int threads : {2, 5}) {
     const auto again = fuse(maps, {}, 2000, threads);
-    EXPECT_TRUE(std::equal(some.begin(), some.end(), again.begin(), again.end(), [](const auto& a, const auto& b) {
-      return a.map == b.map && a.pixel == b.pixel;
-    }));
+    EXPECT_TRUE(std::equal(some.begin(), some.end(), again.begin(), again.end(),
+                           [](const auto& a, const auto& b) { return a.map == b.map && a.pixel == b.pixel; }));
   }
   const auto everything = set_of(all);
   size_t of_map[4] = {0, 0, 0, 0}, all_of_map[4] = {0, 0, 0, 0};
@@ -173,8 +173,11 @@ TEST(DepthFusion, CancelledItHasNoPoints) {
 }
 
 TEST(DepthFusion, PointsLieWhereTheirDepthIs) {
-  const std::vector<DepthMap> maps = {map_of(textured_scene::plane({0.2, 0.1, 1}, 2), turned(camera_at({0.1, 0, 0}), 0.2))};
-  const maq::PointCloud cloud = points_of(maps, fuse(maps, {}), {5, 6, 7});
+  const std::vector<DepthMap> maps = {
+      map_of(textured_scene::plane({0.2, 0.1, 1}, 2), turned(camera_at({0.1, 0, 0}), 0.2))};
+  std::vector<FusedPixel> pixels = fuse(maps, {});
+  const maq::PointCloud cloud = points_of(maps, {5, 6, 7}, pixels);
+  EXPECT_EQ(pixels.size(), cloud.count());
   ASSERT_GT(cloud.count(), 10000u);
   for (size_t i = 0; i < cloud.count(); ++i) {
     EXPECT_NEAR(0.2 * (double(cloud.x[i]) + 5) + 0.1 * (double(cloud.y[i]) + 6) + double(cloud.z[i]) + 7, 2, 1e-5);

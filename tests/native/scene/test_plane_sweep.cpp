@@ -9,20 +9,23 @@ namespace {
 using maq::DepthPlanes;
 using maq::MatchingCost;
 using textured_scene::camera_at;
+using textured_scene::TracedView;
 using textured_scene::turned;
-using textured_scene::View;
 using textured_scene::view_of;
 
-std::vector<View> views_from(const textured_scene::Surface& surface, double baseline, int width_px = 160) {
-  std::vector<View> views;
-  for (const textured_scene::Vector& at : {textured_scene::Vector{0, 0, 0}, {-baseline, 0, 0}, {baseline, 0.1 * baseline, 0},
-                                           {0, -baseline, 0}, {0.1 * baseline, baseline, 0}}) {
+std::vector<TracedView> views_from(const textured_scene::Surface& surface, double baseline, int width_px = 160) {
+  std::vector<TracedView> views;
+  for (const textured_scene::Vector& at : {textured_scene::Vector{0, 0, 0},
+                                           {-baseline, 0, 0},
+                                           {baseline, 0.1 * baseline, 0},
+                                           {0, -baseline, 0},
+                                           {0.1 * baseline, baseline, 0}}) {
     views.push_back(view_of(surface, camera_at(at, width_px, width_px * 3 / 4)));
   }
   return views;
 }
 
-std::vector<float> depth_of_first(const std::vector<View>& views, double near, double far, int threads = 1) {
+std::vector<float> depth_of_first(const std::vector<TracedView>& views, double near, double far, int threads = 1) {
   std::vector<const maq::StereoPhoto*> neighbours;
   for (size_t i = 1; i < views.size(); ++i) neighbours.push_back(&views[i].photo);
   static MatchingCost costs;  // with what an earlier photo left
@@ -40,7 +43,7 @@ size_t known(const std::vector<float>& depth) {
 }
 
 // 1 - correlation of windows of 7 x 7 around a pixel and where the plane takes it to.
-double exact_cost(const View& first, const View& other, int x, int y, double depth) {
+double exact_cost(const TracedView& first, const TracedView& other, int x, int y, double depth) {
   double sums[5] = {0, 0, 0, 0, 0};
   const auto& a = first.photo.camera;
   const auto& b = other.photo.camera;
@@ -75,7 +78,7 @@ double exact_cost(const View& first, const View& other, int x, int y, double dep
 }
 
 TEST(PlaneSweep, CostsAreTheCorrelationOfTheHalfOfTheNeighboursThatFitBest) {
-  const std::vector<View> views = views_from(textured_scene::plane({0.3, 0.1, 1}, 2), 0.15);
+  const std::vector<TracedView> views = views_from(textured_scene::plane({0.3, 0.1, 1}, 2), 0.15);
   const DepthPlanes planes{1.2, 3};
   for (size_t count = 1; count <= 4; ++count) {
     std::vector<const maq::StereoPhoto*> neighbours;
@@ -97,58 +100,59 @@ TEST(PlaneSweep, CostsAreTheCorrelationOfTheHalfOfTheNeighboursThatFitBest) {
 }
 
 TEST(PlaneSweep, DepthOfASlantedPlaneIsRightBetweenPlanes) {
-  const std::vector<View> views = views_from(textured_scene::plane({0.3, 0.1, 1}, 2), 0.35, 320);
+  const std::vector<TracedView> views = views_from(textured_scene::plane({0.3, 0.1, 1}, 2), 0.35, 320);
   const std::vector<float> depth = depth_of_first(views, 1.2, 3);
   EXPECT_GT(fraction_right(views[0], depth, 0.01), 0.99);
   EXPECT_GT(fraction_right(views[0], depth, 0.003), 0.95);  // planes are 0.8 % apart
 }
 
 TEST(PlaneSweep, DepthOfASphereBeforeAPlane) {
-  const std::vector<View> views =
-      views_from(textured_scene::both(textured_scene::sphere({0, 0, 2}, 0.5), textured_scene::plane({0, 0, 1}, 3)), 0.35, 320);
+  const std::vector<TracedView> views = views_from(
+      textured_scene::both(textured_scene::sphere({0, 0, 2}, 0.5), textured_scene::plane({0, 0, 1}, 3)), 0.35, 320);
   EXPECT_GT(fraction_right(views[0], depth_of_first(views, 1.2, 4), 0.01), 0.93);
 }
 
 TEST(PlaneSweep, OneNeighbourOfAnotherSizeAndExposureIsEnough) {
   const auto surface = textured_scene::plane({0.2, 0, 1}, 2);
-  const std::vector<View> views = {view_of(surface, camera_at({0, 0, 0})),
-                                   view_of(surface, turned(camera_at({0.2, 0, 0}, 250, 133), 0.1), 0.6)};
+  const std::vector<TracedView> views = {view_of(surface, camera_at({0, 0, 0})),
+                                         view_of(surface, turned(camera_at({0.2, 0, 0}, 250, 133), 0.1), 0.6)};
   EXPECT_GT(fraction_right(views[0], depth_of_first(views, 1.2, 3), 0.01, 24), 0.9);
 }
 
 TEST(PlaneSweep, ARangeOfDepthOfOneToAThousandKeepsWhatIsNear) {
-  const std::vector<View> views = views_from(textured_scene::plane({0, 0, 1}, 2), 0.15);
+  const std::vector<TracedView> views = views_from(textured_scene::plane({0, 0, 1}, 2), 0.15);
   EXPECT_GT(fraction_right(views[0], depth_of_first(views, 1, 1000), 0.02), 0.95);
 }
 
 TEST(PlaneSweep, TheResultIsTheSameForAnyNumberOfThreads) {
-  const std::vector<View> views = views_from(textured_scene::sphere({0, 0, 2}, 0.7), 0.15, 132);
+  const std::vector<TracedView> views = views_from(textured_scene::sphere({0, 0, 2}, 0.7), 0.15, 132);
   const std::vector<float> depth = depth_of_first(views, 1, 3, 1);
   for (const int threads : {2, 3, 8}) EXPECT_EQ(depth_of_first(views, 1, 3, threads), depth) << threads;
 }
 
 TEST(PlaneSweep, BlackAndOverexposedPhotosHaveNoDepth) {
   for (const uint8_t level : {0, 255}) {
-    std::vector<View> views = views_from(textured_scene::plane({0, 0, 1}, 2), 0.2);
-    for (View& view : views) std::fill(view.photo.grey.begin(), view.photo.grey.end(), level);
+    std::vector<TracedView> views = views_from(textured_scene::plane({0, 0, 1}, 2), 0.2);
+    for (TracedView& view : views) std::fill(view.photo.grey.begin(), view.photo.grey.end(), level);
     EXPECT_EQ(known(depth_of_first(views, 1, 3)), 0u) << int(level);
   }
 }
 
 TEST(PlaneSweep, NeighboursThatShowNothingOfThePhotoGiveNoDepth) {
   const auto surface = textured_scene::plane({0, 0, 1}, 2);
-  const std::vector<View> behind = {view_of(surface, camera_at({0, 0, 0})),
-                                    view_of(surface, turned(camera_at({0.2, 0, 0}), 3.14159265))};
+  const std::vector<TracedView> behind = {view_of(surface, camera_at({0, 0, 0})),
+                                          view_of(surface, turned(camera_at({0.2, 0, 0}), 3.14159265))};
   EXPECT_EQ(known(depth_of_first(behind, 1, 3)), 0u);
-  const std::vector<View> far_aside = {view_of(surface, camera_at({0, 0, 0})), view_of(surface, camera_at({50, 0, 0}))};
+  const std::vector<TracedView> far_aside = {view_of(surface, camera_at({0, 0, 0})),
+                                             view_of(surface, camera_at({50, 0, 0}))};
   EXPECT_EQ(known(depth_of_first(far_aside, 1, 3)), 0u);
 }
 
 TEST(PlaneSweep, PhotosOfOnePixelToFewHaveAResult) {
   const auto surface = textured_scene::plane({0, 0, 1}, 2);
   for (const int side : {1, 2, 3, 7, 33}) {
-    const std::vector<View> views = {view_of(surface, camera_at({0, 0, 0}, side, 1)),
-                                     view_of(surface, camera_at({0.1, 0, 0}, 1, side))};
+    const std::vector<TracedView> views = {view_of(surface, camera_at({0, 0, 0}, side, 1)),
+                                           view_of(surface, camera_at({0.1, 0, 0}, 1, side))};
     EXPECT_EQ(depth_of_first(views, 1, 3).size(), size_t(side));
   }
 }
@@ -156,7 +160,7 @@ TEST(PlaneSweep, PhotosOfOnePixelToFewHaveAResult) {
 TEST(PlaneSweep, APlaneSeenEdgeOnTakesNothingFromThePlaneBehindIt) {
   // A floor at eye level is a line in the photo.
   const auto wall = textured_scene::plane({0, 0, 1}, 2.5), floor = textured_scene::plane({0, 1, 0}, 1e-4);
-  const std::vector<View> views = views_from(textured_scene::both(wall, floor), 0.1);
+  const std::vector<TracedView> views = views_from(textured_scene::both(wall, floor), 0.1);
   EXPECT_GT(fraction_right(views[0], depth_of_first(views, 1, 4), 0.02), 0.4);
 }
 

@@ -6,8 +6,8 @@
 
 namespace {
 
-using maq::plan_views;
 using maq::PinholeCamera;
+using maq::plan_views;
 using maq::ViewPlan;
 using textured_scene::camera_at;
 using textured_scene::turned;

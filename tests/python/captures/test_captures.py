@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from export.camera import Camera
-from export.captures.dense import depth_maps, fused, neighbours_of
+from export.captures.dense import dense_cloud
 from export.captures.folder import write_depths
 from export.captures.originals import ORIGINALS, Photo, box_mask
-from export.captures.plane_sweep import GreyView, depth_of
 from export.captures.structure import CaptureError, up_of_cameras
 from export.photos.packages import load_packages
 from export.scenes.captures import read_capture
@@ -50,50 +49,36 @@ def wall():
     return cameras, [seen_wall(camera, pattern) for camera in cameras]
 
 
-def test_a_sweep_finds_the_depth_of_a_slanted_wall(wall):
+def sparse_points() -> np.ndarray:
+    """Points on the wall, all seen by all cameras."""
+    x, z = np.meshgrid(np.linspace(-0.4, 0.4, 6), np.linspace(-0.4, 0.4, 6))
+    return np.stack([x.ravel(), np.zeros(36), z.ravel()], 1)
+
+
+def test_points_lie_on_the_wall_that_the_photos_show(wall):
     cameras, seen = wall
-    full = np.ones(SIZE[::-1], bool)
-    views = [GreyView(camera, picture, full) for camera, (picture, _) in zip(cameras, seen, strict=True)]
-    depth = depth_of(views[0], [views[1], views[2]], 1.4, 4.0)
-    found = depth > 0
-    assert found.mean() > 0.6
-    assert np.median(np.abs(depth / seen[0][1] - 1)[found]) < 0.005
-    # Were a camera elsewhere, so would be what is found.
-    moved = GreyView(looking((-0.1, -2, 0)), views[1].grey, full)
-    wrong = depth_of(views[0], [moved, moved], 1.4, 4.0)
-    assert np.median(np.abs(wrong / seen[0][1] - 1)[wrong > 0]) > 0.02
-
-
-def sparse_points(cameras):
-    """Numbers and places of points on the wall, all seen by all cameras."""
-    grid = np.linspace(-0.4, 0.4, 6)
-    places = {k: np.array([x, 0, z]) for k, (x, z) in enumerate((x, z) for x in grid for z in grid)}
-    return [set(places)] * len(cameras), places
-
-
-def test_points_are_kept_where_views_agree(wall):
-    cameras, seen = wall
-    known, places = sparse_points(cameras)
     images = [np.repeat(picture[..., None], 3, 2).astype(np.uint8) for picture, _ in seen]
+    images[0][..., 0] = 0
     masks = [np.ones(SIZE[::-1], bool) for _ in cameras]
-    depths = depth_maps(cameras, images, masks, known, places)
-    xyz, rgb = fused(cameras, images, depths)
+    masks[1][:45] = False
+    depths, xyz, rgb = dense_cloud(cameras, images, masks, sparse_points())
     assert len(xyz) == len(rgb) > 5000
     assert np.quantile(np.abs(xyz[:, 1]), 0.95) < 0.04  # of 2
-    assert 4000 < len(fused(cameras, images, depths, max_points=5000)[0]) <= 5000
-    assert len(fused(cameras, images, depths, min_witnesses=4)[0]) < len(xyz)
-    # Images of nothing in common make no cloud.
-    rng = np.random.default_rng(1)
-    noise = [rng.integers(0, 255, image.shape, dtype=np.uint8) for image in images]
-    with pytest.raises(CaptureError, match="points"):
-        fused(cameras, noise, depth_maps(cameras, noise, masks, known, places))
+    assert (rgb[:, 2] == 0).any()
+    found = depths[0] > 0
+    assert found.mean() > 0.6
+    assert np.median(np.abs(depths[0] / seen[0][1] - 1)[found]) < 0.005
+    assert not depths[1][:45].any()
+    assert depths[1][45:].any()
+    assert len(dense_cloud(cameras, images, masks, sparse_points(), max_points=5000)[1]) == 5000
 
 
-def test_neighbours_stand_aside_a_little():
-    cameras = [looking((2 * np.sin(np.radians(a)), -2 * np.cos(np.radians(a)), 0)) for a in (0, 0.5, 10, 40, 11)]
-    known, places = sparse_points(cameras)
-    assert set(neighbours_of(0, cameras, known, places)[:2]) == {2, 4}
-    assert neighbours_of(0, cameras, known, places)[-1] == 3
+def test_photos_without_anything_in_common_make_no_cloud(wall):
+    cameras, _ = wall
+    dark = [np.zeros((*SIZE[::-1], 3), np.uint8) for _ in cameras]
+    masks = [np.ones(SIZE[::-1], bool) for _ in cameras]
+    with pytest.raises(CaptureError, match="depth"):
+        dense_cloud(cameras, dark, masks, sparse_points())
 
 
 def test_up_is_level_though_all_cameras_look_down_from_one_side():

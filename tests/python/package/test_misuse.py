@@ -23,7 +23,7 @@ MAY_BE_NULL = {"config", "user_data", "release_callback", "preview", "seen_point
                "width_px", "height_px", "maq_edges_model_create curves", "maq_prediction_model_create novelty",
                "maq_recorder_create source", "maq_head_builder_add_photo photo", "maq_pipeline_set_model model",
                "maq_pipeline_set_recording path", "maq_edges_fusion_copy_points points",
-               "maq_densepose_result_find_pixel distance"}  # fmt: skip
+               "maq_densepose_result_find_pixel distance", "maq_dense_cloud_get_points rgb"}  # fmt: skip
 # Arguments that are looked at after something that the objects of this test lack: cameras, controls, depth, room.
 LATER = {"maq_camera_list_get_camera info", "maq_camera_list_get_mode mode", "maq_source_get_control info",
          "maq_capture_get_drop drop", "maq_capture_load_depth camera", "maq_frame_get_depth desc",

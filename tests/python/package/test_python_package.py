@@ -251,6 +251,38 @@ def test_a_scene_is_built_saved_and_rendered(tmp_path):
         maquette.Scene.build(folder, progress=lambda done, stage: 1 / 0)
 
 
+def test_photos_of_a_wall_make_a_dense_cloud_of_it_and_a_scene():
+    rng = np.random.default_rng(0)
+    pattern = np.kron(rng.integers(30, 220, (48, 64, 3)), np.ones((3, 3, 1))).astype(np.uint8)
+    # Cameras that stand 10 pixels of the wall apart, 2 before it.
+    photos = [pattern[:, 40 - shift : 150 - shift] for shift in (0, 10, -10)]
+    intrinsics = maquette.Intrinsics.centred(110, 144, fov_deg=58)
+    step = 10 * 2 / intrinsics.fx_px
+    cameras = [maquette.PinholeCamera(intrinsics, np.eye(3), np.array([-k * step, 0, 5])) for k in (0, 1, -1)]
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, 8), np.linspace(-0.8, 0.8, 8))
+    sparse = np.stack([x.ravel(), y.ravel(), 7 + 0.1 * np.sin(9 * x.ravel())], 1)
+    stages = []
+
+    dense = maquette.DenseCloud(photos, cameras, sparse, progress=lambda done, stage: stages.append((done, stage)))
+    frame, camera = dense.depth(1)
+
+    assert dense.points.shape == dense.rgb.shape
+    assert np.median(np.abs(dense.points[:, 2] - 7)) < 0.02
+    assert np.mean(np.abs(dense.points[:, 2] - 7) < 0.1) > 0.8
+    assert frame.depth().shape == (144, 110)
+    np.testing.assert_allclose(camera.centre, cameras[1].centre)
+    assert [done for done, _ in stages] == sorted(done for done, _ in stages)
+    again = maquette.DenseCloud(photos, cameras, sparse - [0, 0, 7], origin=(0, 0, 7), threads=2, max_points=1000)
+    assert len(again.points) == 1000
+    assert np.median(np.abs(again.points[:, 2])) < 0.02
+    with pytest.raises(maquette.MaquetteError, match="MAQ_ERROR_NOT_FOUND"):
+        maquette.DenseCloud(photos[:1], cameras[:1], sparse)
+    with pytest.raises(ValueError, match="3 photos, 2 cameras"):
+        maquette.DenseCloud(photos, cameras[:2], sparse)
+    with pytest.raises(maquette.MaquetteError, match="MAQ_CANCELLED"):
+        maquette.DenseCloud(photos, cameras, sparse, progress=lambda done, stage: False)
+
+
 def test_a_camera_that_looks_at_a_point_sees_it_in_the_middle():
     intrinsics = maquette.Intrinsics.centred(640, 480, fov_deg=60)
     camera = maquette.PinholeCamera.looking_at(intrinsics, [1, 2, 3], [4, 2, 1], up=[0, 0, 1])

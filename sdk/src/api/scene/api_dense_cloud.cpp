@@ -90,9 +90,10 @@ maq_status maq_dense_cloud_create(maq_context* context, const maq_dense_cloud_co
         make_dense_cloud(input, options, progress_of(config.progress_callback, config.progress_user_data));
     if (!dense) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback cancelled the cloud.");
     if (dense->cloud.count() == 0) {
-      throw Error(MAQ_ERROR_NOT_FOUND,
-                  "No photo has depth: a photo needs 12 points of the sparse cloud in its image, and another photo that "
-                  "sees them from another place.");
+      throw Error(
+          MAQ_ERROR_NOT_FOUND,
+          "No photo has depth: a photo needs 12 points of the sparse cloud in its image, and another photo that "
+          "sees them from another place.");
     }
     auto made = std::make_unique<maq_dense_cloud>();
     made->xyz.reserve(3 * dense->cloud.count());

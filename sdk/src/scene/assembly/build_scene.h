@@ -23,8 +23,8 @@ struct SceneBuildOptions {
   // are left out.
   int long_side_px = 640;
   // For captures:
-  size_t max_views = 0;        // evenly from all that may be used; 0: all
-  bool uses_held_out = false;  // photos that the capture keeps for comparisons
+  size_t max_views = 0;                        // evenly from all that may be used; 0: all
+  bool uses_held_out = false;                  // photos that the capture keeps for comparisons
   PointSource points = PointSource::kDefault;  // kDepth for sparse clouds, kCloud for others
 };
 

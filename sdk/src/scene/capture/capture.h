@@ -34,8 +34,9 @@ struct Capture {
 
 // Opens what is in a folder: a COLMAP model in sparse/0, sparse, colmap/sparse/0 or the folder itself, with the photos
 // in images, photos, rgb, input or the folder itself, and the dense fused.ply in place of the model's points where
-// there is one (otherwise the cloud is sparse); or transforms.json (or transforms_train.json) with the PLY cloud that it names, or sparse_pc.ply,
-// points3d.ply, points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there is taken.
+// there is one (otherwise the cloud is sparse); or transforms.json (or transforms_train.json) with the PLY cloud that
+// it names, or sparse_pc.ply, points3d.ply, points3D.ply, pointcloud.ply or cloud.ply. The first of these that is there
+// is taken.
 //
 // A photo of another size than its camera is used if both have the same aspect ratio within 1 %. Photos are read as
 // they are stored, not rotated by EXIF, as by the programs that find the cameras. Unusable parts are dropped and

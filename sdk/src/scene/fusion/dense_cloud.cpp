@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kDepthFraction = 0.85;  // of the time
 constexpr size_t kVoters = 8;            // neighbours whose depth is asked about a point
-constexpr size_t kPhotosPerTrust = 9;    // see FusionRule::min_trust
-constexpr size_t kMaxTrust = 5;
+// With few photos few neighbours can confirm a depth: then all depth counts (docs/research/scenes.md, "Fusion").
+constexpr size_t kPhotosWithTrust = 30;
+constexpr int kTrust = 5;
 
 std::string text_of_step(size_t photo, size_t photos) {
   return "Depth of photo " + std::to_string(photo + 1) + " of " + std::to_string(photos);
@@ -85,15 +86,15 @@ std::optional<DenseCloud> make_dense_cloud(const DenseCloudInput& input, const D
   WorkerThreads threads(options.threads);
   if (!find_depth(load_grey(input), input.points, threads, progress, made.maps)) return {};
   FusionRule rule;
-  rule.min_trust = int(std::min(std::max(size_t(1), input.photos / kPhotosPerTrust), kMaxTrust));
+  rule.min_trust = input.photos < kPhotosWithTrust ? 0 : kTrust;
   bool is_cancelled = false;
-  const std::vector<FusedPixel> pixels =
-      fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
-        is_cancelled = progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
-        return !is_cancelled;
-      });
+  std::vector<FusedPixel> pixels = fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
+    is_cancelled =
+        progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
+    return !is_cancelled;
+  });
   if (is_cancelled) return {};
-  made.cloud = points_of(made.maps, pixels, input.points.origin);
+  made.cloud = points_of(made.maps, input.points.origin, pixels);
   if (options.wants_colours) made.cloud.rgb = colours_of(input, pixels);
   return made;
 }

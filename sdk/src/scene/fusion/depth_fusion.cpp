@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/simd_clones.h"
 #include "scene/stereo/stereo_photo.h"
 
 namespace maq {
@@ -27,8 +26,8 @@ struct Projection {
   int width_px, height_px;
 };
 
-MAQ_SIMD_CLONES void project_row(const Projection& given, int y, const float* __restrict depth, int count,
-                                 int32_t* __restrict pixels, float* __restrict depths) {
+void project_row(const Projection& given, int y, const float* __restrict depth, int count, int32_t* __restrict pixels,
+                 float* __restrict depths) {
   const Projection by = given;
   float at[3];
   for (int i = 0; i < 3; ++i) at[i] = by.turn[3 * i + 1] * float(y) + by.turn[3 * i + 2];
@@ -39,11 +38,12 @@ MAQ_SIMD_CLONES void project_row(const Projection& given, int y, const float* __
     const float inverse = 1.0f / z;
     const float u = ((at[0] + by.turn[0] * x) * here + by.shift[0]) * inverse;
     const float v = ((at[1] + by.turn[3] * x) * here + by.shift[1]) * inverse;
-    const int inside = int(here > 0.0f) & int(z > 0.0f) & int(u > -0.5f) & int(v > -0.5f) & int(u < right) &
-                       int(v < bottom);
+    const int inside =
+        int(here > 0.0f) & int(z > 0.0f) & int(u > -0.5f) & int(v > -0.5f) & int(u < right) & int(v < bottom);
     const float in_u = inside != 0 ? u : 0.0f, in_v = inside != 0 ? v : 0.0f;
-    const int pixel = int(in_v + 0.5f) * by.width_px + int(in_u + 0.5f);
-    pixels[i] = inside != 0 ? pixel : -1;
+    // Just below the border, the sum with a half may be rounded up to it.
+    const int column = std::min(int(in_u + 0.5f), by.width_px - 1), line = std::min(int(in_v + 0.5f), by.height_px - 1);
+    pixels[i] = inside != 0 ? line * by.width_px + column : -1;
     depths[i] = z;
   }
 }
@@ -152,11 +152,12 @@ std::vector<FusedPixel> fuse_depth_maps(const std::vector<DepthMap>& maps, const
   return taken;
 }
 
-PointCloud points_of(const std::vector<DepthMap>& maps, const std::vector<FusedPixel>& pixels,
-                     const std::array<double, 3>& origin) {
+PointCloud points_of(const std::vector<DepthMap>& maps, const std::array<double, 3>& origin,
+                     std::vector<FusedPixel>& pixels) {
   PointCloud cloud;
   cloud.origin = origin;
   cloud.reserve(pixels.size(), false);
+  size_t kept = 0;
   for (const FusedPixel& at : pixels) {
     const DepthMap& map = maps[at.map];
     const PinholeCamera& camera = map.camera;
@@ -168,8 +169,9 @@ PointCloud points_of(const std::vector<DepthMap>& maps, const std::vector<FusedP
       point[k] = camera.centre[k];
       for (size_t row = 0; row < 3; ++row) point[k] += camera.rotation[3 * row + k] * ray[row];
     }
-    cloud.add(point[0], point[1], point[2]);
+    if (cloud.add(point[0], point[1], point[2])) pixels[kept++] = at;
   }
+  pixels.resize(kept);
   return cloud;
 }
 

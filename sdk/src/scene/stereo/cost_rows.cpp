@@ -43,7 +43,7 @@ MAQ_SIMD_CLONES void cost_row(const ColumnSums& sums, const int32_t* __restrict 
                               const float* __restrict grey_scale, const int32_t* __restrict samples, int worst,
                               int count, int32_t* __restrict costs) {
   const int32_t *const sample = sums.sample.data(), *const square = sums.square.data(),
-                *const product = sums.product.data();
+                       *const product = sums.product.data();
   for (int i = 0; i < count; ++i) {
     const auto over_window = [i](const int32_t* of) {
       return of[i] + of[i + 1] + of[i + 2] + of[i + 3] + of[i + 4] + of[i + 5] + of[i + 6];

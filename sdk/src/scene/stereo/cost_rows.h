@@ -29,7 +29,8 @@ struct PixelRow {
   float at[3], step[3];
 };
 
-// Bilinear samples of a photo whose `quads` have four pixels each: of its own place, right of it, below, and right below.
+// Bilinear samples of a photo whose `quads` have four pixels each: of its own place, right of it, below, and right
+// below.
 void sample_row(const uint32_t* quads, int quads_width, int quads_height, const PixelRow& row, int count,
                 int32_t* samples);
 

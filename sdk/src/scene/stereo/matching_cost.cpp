@@ -156,7 +156,7 @@ void MatchingCost::compute(const StereoPhoto& photo, const std::vector<const Ste
                         of_neighbour[k].data());
       }
       uint8_t* const best = &planes_of_band[size_t(plane) * pixels];
-      // Of two neighbours the better one counts: each is given twice.
+      // With two neighbours the better one counts: each is given twice.
       best_half(of_neighbour[0].data(), of_neighbour[count > 2 ? 1 : 0].data(), of_neighbour[count > 2 ? 2 : 1].data(),
                 of_neighbour[count > 2 ? 3 : 1].data(), int(pixels), best);
     }

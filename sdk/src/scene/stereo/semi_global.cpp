@@ -13,10 +13,6 @@ constexpr int kPlanes = DepthPlanes::kCount;
 constexpr uint8_t kSmallStep = 8, kLargeStep = 50;
 constexpr uint8_t kMaxCost = 75;  // of a depth that is believed
 constexpr int kStripColumns = 16;
-constexpr int kPeakPlanes = 3;
-}  // namespace
-int min_margin = 0;
-namespace {
 
 // Costs of a path's last pixel, with a plane that is never taken on either side.
 struct PathCost {
@@ -88,10 +84,6 @@ MAQ_SIMD_CLONES void solve_upwards(const uint8_t* __restrict costs, PathCost* __
     while (total[best] != least) ++best;
     planes[x] = -1;
     if (best == 0 || best == kPlanes - 1 || costs[x * kPlanes + best] >= kMaxCost) continue;
-    uint16_t other = 0xffff;
-    for (int i = 0; i < best - kPeakPlanes; ++i) other = total[i] < other ? total[i] : other;
-    for (int i = best + kPeakPlanes + 1; i < kPlanes; ++i) other = total[i] < other ? total[i] : other;
-    if (other - least < min_margin) continue;
     const int before = total[best - 1], after = total[best + 1], bend = before - 2 * least + after;
     planes[x] = float(best) + (bend > 0 ? 0.5f * float(before - after) / float(bend) : 0.0f);
   }
@@ -105,9 +97,8 @@ void SemiGlobal::solve(const MatchingCost& costs, const DepthPlanes& planes, Wor
   const size_t row_bytes = size_t(width) * kPlanes;
   sums_.resize(row_bytes * size_t(height));
   depth.resize(size_t(width) * size_t(height));
-  threads.run(size_t(height), [&](size_t y, int) {
-    sum_along_row(costs.pixel(0, int(y)), width, &sums_[y * row_bytes]);
-  });
+  threads.run(size_t(height),
+              [&](size_t y, int) { sum_along_row(costs.pixel(0, int(y)), width, &sums_[y * row_bytes]); });
   threads.run(size_t(width + kStripColumns - 1) / kStripColumns, [&](size_t strip, int) {
     const int left = int(strip) * kStripColumns, columns = std::min(kStripColumns, width - left);
     const auto sums = [&](int y) { return &sums_[size_t(y) * row_bytes + size_t(left) * kPlanes]; };

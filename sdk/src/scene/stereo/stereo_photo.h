@@ -17,8 +17,8 @@ struct StereoPhoto {
   size_t pixels() const { return size_t(camera.width_px) * size_t(camera.height_px); }
 };
 
-// From pixels of one camera to pixels of another: (x, y, 1) at depth z is at turn (x, y, 1) + shift / z, both times z in
-// the other camera; the third number is the depth there.
+// From pixels of one camera to pixels of another: (x, y, 1) at depth z is at turn (x, y, 1) + shift / z, both times z
+// in the other camera; the third number is the depth there.
 struct PixelTransfer {
   PixelTransfer(const PinholeCamera& from, const PinholeCamera& to);
 

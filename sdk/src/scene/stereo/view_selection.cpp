@@ -59,7 +59,8 @@ double neighbour_score(const PinholeCamera& a, const PinholeCamera& b, const std
       length_a += to_a * to_a;
       length_b += to_b * to_b;
     }
-    cosines.push_back(dot / std::sqrt(length_a * length_b));
+    const double cosine = dot / std::sqrt(length_a * length_b);
+    if (std::isfinite(cosine)) cosines.push_back(cosine);
     ++i, ++j;
   }
   if (cosines.size() < kMinShared) return 0;
@@ -88,14 +89,16 @@ std::vector<ViewPlan> plan_views(const std::vector<PinholeCamera>& cameras, cons
   std::vector<ViewPlan> plans(views);
   for (size_t i = 0; i < views; ++i) {
     if (seen[i].size() < kMinShared) continue;
-    std::vector<std::pair<double, uint32_t>> scores;
+    std::vector<double> scores(views);
     for (size_t j = 0; j < views; ++j) {
-      const double score = j == i ? 0 : neighbour_score(cameras[i], cameras[j], seen[i], seen[j], points);
-      if (score > 0) scores.emplace_back(-score, uint32_t(j));
+      if (j != i) scores[j] = neighbour_score(cameras[i], cameras[j], seen[i], seen[j], points);
     }
-    std::sort(scores.begin(), scores.end());
-    if (scores.size() > max_neighbours) scores.resize(max_neighbours);
-    for (const auto& [score, j] : scores) plans[i].neighbours.push_back(j);
+    while (plans[i].neighbours.size() < max_neighbours) {
+      const auto best = std::max_element(scores.begin(), scores.end());
+      if (!(*best > 0)) break;
+      plans[i].neighbours.push_back(uint32_t(best - scores.begin()));
+      *best = 0;
+    }
     std::vector<double> depths;
     for (const Seen& point : seen[i]) depths.push_back(point.depth);
     plans[i].near = kNearMargin * value_at(depths, kNearFraction);

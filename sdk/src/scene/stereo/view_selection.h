@@ -13,7 +13,8 @@ struct ViewPlan {
   std::vector<uint32_t> neighbours;  // indices, the best first
   double near = 0, far = 0;          // depths between which most of the points are
 
-  bool has_depth() const { return !neighbours.empty() && near > 0; }
+  // Depths are floats.
+  bool has_depth() const { return !neighbours.empty() && near > 1e-30 && far < 1e30; }
 };
 
 // Neighbours see most of the points that a photo sees, from some 10 degrees aside; at most `max_neighbours` each. A

@@ -59,7 +59,8 @@ class ApiDenseClouds : public ::testing::Test {
     maq_dense_cloud* cloud = nullptr;
     EXPECT_EQ(maq_dense_cloud_create(context_.get(), config, posed_.data(), uint32_t(posed_.size()), &sparse, &cloud),
               status);
-    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos) << maq_last_error(context_.get());
+    EXPECT_NE(std::string(maq_last_error(context_.get())).find(text), std::string::npos)
+        << maq_last_error(context_.get());
     EXPECT_EQ(cloud, nullptr);
   }
 

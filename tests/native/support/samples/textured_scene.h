@@ -37,7 +37,7 @@ inline Surface sphere(const Vector& centre, double radius) {
   };
 }
 
-// What is nearer of two.
+// The nearer of two.
 inline Surface both(const Surface& one, const Surface& other) {
   return [=](const Vector& from, const Vector& along) -> std::optional<double> {
     const auto a = one(from, along), b = other(from, along);
@@ -75,14 +75,14 @@ inline maq::PinholeCamera turned(maq::PinholeCamera camera, double angle) {
   return camera;
 }
 
-struct View {
+struct TracedView {
   maq::StereoPhoto photo;
   std::vector<double> depth;  // along the optical axis; 0: no surface
 };
 
 // `exposure`: factor of the grey levels.
-inline View view_of(const Surface& surface, const maq::PinholeCamera& camera, double exposure = 1) {
-  View view;
+inline TracedView view_of(const Surface& surface, const maq::PinholeCamera& camera, double exposure = 1) {
+  TracedView view;
   view.photo.camera = camera;
   const auto& r = camera.rotation;
   for (int y = 0; y < camera.height_px; ++y) {
@@ -99,8 +99,9 @@ inline View view_of(const Surface& surface, const maq::PinholeCamera& camera, do
   return view;
 }
 
-// Of the pixels with a surface farther than `border_px` from the edge, the fraction whose depth is within `tolerance`.
-inline double fraction_right(const View& view, const std::vector<float>& depth, double tolerance, int border_px = 8) {
+// The fraction of the pixels whose depth is within `tolerance`. Pixels within `border_px` of the edge do not count.
+inline double fraction_right(const TracedView& view, const std::vector<float>& depth, double tolerance,
+                             int border_px = 8) {
   const int width = view.photo.camera.width_px, height = view.photo.camera.height_px;
   double right = 0, all = 0;
   for (int y = border_px; y < height - border_px; ++y) {
@@ -115,9 +116,9 @@ inline double fraction_right(const View& view, const std::vector<float>& depth, 
 }
 
 // Points on the surface that the cameras see, every `step` pixels: a sparse cloud.
-inline maq::PointCloud sparse_points(const std::vector<View>& views, int step) {
+inline maq::PointCloud sparse_points(const std::vector<TracedView>& views, int step) {
   maq::PointCloud cloud;
-  for (const View& view : views) {
+  for (const TracedView& view : views) {
     const maq::PinholeCamera& camera = view.photo.camera;
     for (int y = step / 2; y < camera.height_px; y += step) {
       for (int x = step / 2; x < camera.width_px; x += step) {

@@ -53,12 +53,13 @@ data class PinholeCamera(val intrinsics: Intrinsics, val rotation: List<Double>,
         require(centre.size == 3) { "The centre has ${centre.size} numbers; it needs 3." }
     }
 
-    internal fun native() =
-        maq_pinhole_camera().also {
-            intrinsics.writeTo(it.intrinsics)
-            it.rotation = rotation
-            it.centre = centre
-        }
+    internal fun native() = maq_pinhole_camera().also(::writeTo)
+
+    internal fun writeTo(native: maq_pinhole_camera) {
+        intrinsics.writeTo(native.intrinsics)
+        native.rotation = rotation
+        native.centre = centre
+    }
 
     internal companion object {
         fun of(native: maq_pinhole_camera) =

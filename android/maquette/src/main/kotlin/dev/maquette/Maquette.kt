@@ -352,6 +352,26 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     ): SceneBuilder = handle.use { context -> SceneBuilder(context, cloud, bundle, config) }
 
     /**
+     * Computes a dense cloud from photos and a sparse cloud, such as the feature points of an AR session; takes about a
+     * second a photo, so not on the main thread.
+     *
+     * @param sparse a photo needs 12 of its points in its image, and another photo that sees them from elsewhere.
+     * @param threads 0: the large cores, at most 4.
+     * @param maxPoints if there are more points, a random selection is kept. 0: 1.5 million.
+     * @param progress may cancel; what it throws cancels too, and is thrown.
+     * @throws MaquetteException with [Status.INVALID_ARGUMENT], [Status.NOT_FOUND] (no photo has depth),
+     *   [Status.CANCELLED], [Status.OUT_OF_MEMORY].
+     */
+    fun denseCloud(
+        photos: List<PosedPhoto>,
+        sparse: PointCloud,
+        threads: Int = 0,
+        maxPoints: Long = 0,
+        progress: Progress? = null,
+    ): DenseCloud =
+        handle.use { context -> DenseCloud(context, photos, sparse, threads, maxPoints, progress) }
+
+    /**
      * Opens a scene file (.maqs), which is checked completely and mapped: it must not be written to while the scene is
      * open.
      *

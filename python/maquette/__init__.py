@@ -47,6 +47,8 @@ from maquette.pipeline import (
 )
 from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
 from maquette.progress import ProgressLine
+from maquette.scene_making.make import make_scene
+from maquette.scene_making.report import SceneReport
 from maquette.scenes import Capture, PinholeCamera, Scene, SceneBuilder, SceneRenderer, View
 from maquette.sources import (
     Camera,
@@ -65,12 +67,12 @@ __all__ = [
     "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS", "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult",
     "BodySize", "BodySizes", "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve",
     "Curves", "DenseCloud", "DensePose", "DensePoseModel", "DensePoseResult", "DensePoseTexture", "Edges",
-    "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh",
-    "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget", "Novelty",
-    "NoveltyScore", "Origin",
-    "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult", "PixelFormat", "PredictionModel",
-    "Predictor", "ProgressLine", "Recorder", "Scene", "SceneBuilder", "SceneRenderer", "Source", "SourceScheme", "View",
-    "build_info", "library_path", "list_cameras", "list_source_schemes", "part_colours", "part_name", "sample",
+    "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark",
+    "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget",
+    "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult",
+    "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder", "Scene", "SceneBuilder",
+    "SceneRenderer", "SceneReport", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
+    "list_source_schemes", "make_scene", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

@@ -1,4 +1,4 @@
-"""`python -m maquette`: the command line of the SDK, `maquette`."""
+"""`python -m maquette`: the command line of the SDK, `maquette`, and `scene make`, which needs packages of Python."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ def program() -> Path | None:
 
 
 def main() -> int:
+    if sys.argv[1:3] == ["scene", "make"]:
+        from maquette.scene_making.command import run
+
+        return run(sys.argv[3:])
     found = program()
     if found is None:
         print(

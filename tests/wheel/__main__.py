@@ -22,6 +22,7 @@ SYSTEMS = (*PYTHONS, "bookworm-aarch64")
 PLATFORMS = ("manylinux_2_28", "manylinux2014", "manylinux_2_17")
 EMULATOR = Path("/usr/lib/binfmt.d/qemu-aarch64.conf")  # how Linux starts aarch64 programs, by qemu-user-static
 EMULATED = Path("/proc/sys/fs/binfmt_misc")
+COLMAP = "pycolmap==4.2.1"  # of scenes; wheels are for Python 3.10 and newer on x86-64
 FFMPEG = "imageio-ffmpeg==0.6.0"  # one for all: other versions may round colours of clips otherwise
 MIRROR = os.environ.get("DEBIAN_MIRROR", "http://deb.debian.org/debian")
 INSTALL = """
@@ -65,8 +66,9 @@ def fetch_packages(system: str) -> None:
     if any(WHEELHOUSE.glob(f"numpy-*-cp{python.replace('.', '')}-*{machine}.whl")):
         return
     platforms = [word for platform in PLATFORMS for word in ("--platform", f"{platform}_{machine}")]
+    colmap = [COLMAP] if machine == "x86_64" and python != "3.9" else []
     run(sys.executable, "-m", "pip", "download", "-q", "--only-binary=:all:", "--python-version", python, *platforms,
-        "--dest", WHEELHOUSE, "numpy", "cffi", FFMPEG)  # fmt: skip
+        "--dest", WHEELHOUSE, "numpy", "cffi", FFMPEG, *colmap)  # fmt: skip
 
 
 def bare_system(system: str) -> Path:

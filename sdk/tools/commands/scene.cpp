@@ -15,6 +15,22 @@
 
 namespace {
 
+struct MakeOptions {
+  std::string source;
+  std::string out;
+  std::string photos;
+  std::string threads;
+};
+
+// The program has no code that finds cameras of photos; the Python package does it by COLMAP.
+[[noreturn]] void tell_about_python(const MakeOptions& options) {
+  throw std::runtime_error(
+      "`scene make` finds the cameras of photos by a package of Python, which this program does not have. Run: pip "
+      "install 'maquette[scenes]', then: python -m maquette scene make " +
+      options.source + " --out " + options.out + (options.photos.empty() ? "" : " --photos " + options.photos) +
+      (options.threads.empty() ? "" : " --threads " + options.threads));
+}
+
 struct InfoOptions {
   std::string scene;
   std::string json;
@@ -60,7 +76,17 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   scene->footer(
       "From a folder with photos, cameras and a point cloud (COLMAP, or transforms.json with a PLY file) to a clip:\n\n"
       "  maquette scene build my-room --out my-room.maqs\n"
-      "  maquette scene render my-room.maqs --capture my-room --path through --out clip.mp4");
+      "  maquette scene render my-room.maqs --capture my-room --path through --out clip.mp4\n\n"
+      "From a film or plain photos, by the Python package:\n\n"
+      "  pip install 'maquette[scenes]'\n"
+      "  python -m maquette scene make film.mp4 --out place.maqs");
+  auto making = std::make_shared<MakeOptions>();
+  CLI::App* make = scene->add_subcommand("make", "Make a scene of a film or photos (Python package only)");
+  make->add_option("source", making->source, "A film, or a folder with photos")->required();
+  make->add_option("-o,--out", making->out, "File of the scene: place.maqs")->required();
+  make->add_option("--photos", making->photos, "Photos or frames of the film that are used at most (default 50)");
+  make->add_option("--threads", making->threads, "Threads; default: all cores");
+  make->callback([=] { tell_about_python(*making); });
   add_scene_build_command(*scene, exit_code);
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();

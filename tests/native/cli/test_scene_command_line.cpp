@@ -57,6 +57,16 @@ class SceneCommandLine : public ::testing::Test {
   std::string environment_ = "MAQ_SCENE_BUNDLE='" MAQ_TEST_DATA "/tiny_scene/bundle'";
 };
 
+TEST_F(SceneCommandLine, SaysWhatMakesASceneOfAFilmOrPlainPhotos) {
+  const std::string command = "python -m maquette scene make film.mp4 --out place.maqs";
+  expect_failure("make film.mp4 --out place.maqs", command);
+  write_text(file("film.mp4"), "film");
+  expect_failure("build film.mp4 --out room.maqs", command);
+  std::filesystem::create_directory(file("photos"));
+  expect_failure("build photos --out room.maqs", "python -m maquette scene make photos --out place.maqs");
+  EXPECT_EQ(files(), (std::set<std::string>{"film.mp4", "photos"}));
+}
+
 TEST_F(SceneCommandLine, BuildsASceneWithTheFiguresThatTheBenchmarkReads) {
   const Outcome result = run("build place --out o/place.maqs --json o/build.json --ply o/place.ply");
   ASSERT_EQ(result.exit_code, 0) << result.err;

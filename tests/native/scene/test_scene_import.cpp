@@ -348,6 +348,10 @@ TEST_F(SceneImport, FramesThatCannotBeUsedAreDroppedAndCounted) {
 TEST_F(SceneImport, FoldersWithoutACaptureAreASentence) {
   expect_error(MAQ_ERROR_NOT_FOUND, "is not a folder", [&] { maq::open_capture(folder_.file("nowhere")); });
   expect_refused(MAQ_ERROR_NOT_FOUND, "holds no capture");
+  expect_refused(MAQ_ERROR_NOT_FOUND, "python -m maquette scene make " + folder_.path().string() + " --out place.maqs");
+  write_text(folder_.file("film.mp4"), "film");
+  expect_error(MAQ_ERROR_NOT_FOUND, "film.mp4 is a file, not a folder with photos and cameras. To find the cameras",
+               [&] { maq::open_capture(folder_.file("film.mp4")); });
   MadeCapture made;
   made.write_colmap(folder_, false);
   expect_refused(MAQ_ERROR_UNREADABLE,

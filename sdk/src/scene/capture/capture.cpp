@@ -200,6 +200,13 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
   return capture;
 }
 
+// The end of a sentence about photos without cameras, or a film.
+std::string how_to_find_cameras(const std::string& path) {
+  return concatenate(
+      " To find the cameras and make the scene: pip install 'maquette[scenes]', then python -m maquette ",
+      "scene make ", path, " --out place.maqs");
+}
+
 Capture open_any(const std::string& folder) {
   for (const char* place : {"sparse/0", "sparse", "colmap/sparse/0", "."}) {
     if (const auto files = ColmapFiles::find(folder + "/" + place)) return open_colmap(folder, *files);
@@ -210,12 +217,17 @@ Capture open_any(const std::string& folder) {
   throw Error(
       MAQ_ERROR_NOT_FOUND, folder,
       " holds no capture: neither a COLMAP model (cameras, images and points3D, .bin or .txt, in sparse/0, sparse or "
-      "the folder itself) nor a transforms.json.");
+      "the folder itself) nor a transforms.json.",
+      how_to_find_cameras(folder));
 }
 
 }  // namespace
 
 Capture open_capture(const std::string& folder) {
+  if (file_exists(folder)) {
+    throw Error(MAQ_ERROR_NOT_FOUND, folder, " is a file, not a folder with photos and cameras.",
+                how_to_find_cameras(folder));
+  }
   if (!is_folder(folder)) throw Error(MAQ_ERROR_NOT_FOUND, folder, " is not a folder; check the path.");
   Capture capture = open_any(folder);
   if (capture.cloud.count() == 0 && !has_depth(capture)) {

@@ -1,0 +1,1 @@
+"""From a film or photos to a scene: `maquette.make_scene`."""

@@ -2,9 +2,15 @@
 # Builds the npm package into build/web/package, and the page into build/web/page:
 #
 #   scripts/web/build.sh [JOBS]
+#
+# Exit status 77: it cannot be built here, and the last line says why.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 jobs=${1:-$(nproc)}
+if ! command -v emcc >/dev/null; then
+    echo "emscripten is missing: scripts/install-packages.sh web"
+    exit 77
+fi
 # Debian's emscripten finds its JavaScript tools here, whichever node is in use.
 export NODE_PATH=/usr/share/nodejs${NODE_PATH:+:$NODE_PATH}
 

@@ -72,7 +72,7 @@ export class Engine {
     const numbers = checkOptions(options);
     let core;
     try {
-      core = await createCore({ wasmBinary: wasm });
+      core = await createCore({ wasmBinary: wasm, printErr() {} }); // what it says is in the error
     } catch (error) {
       throw new MaquetteError(
         'MAQ_ERROR_UNSUPPORTED',

@@ -1,5 +1,5 @@
-// What JavaScript calls (web/src/engine.js): the C API of dense pose by plain numbers, so that no struct is laid out in
-// JavaScript. Functions that can fail return a maq_status; error_text() has the sentence.
+// The functions that JavaScript calls (web/src/engine.js): the C API of dense pose by plain numbers, so that no struct
+// is laid out in JavaScript. Functions that can fail return a maq_status; error_text() has the sentence.
 #include <emscripten/emscripten.h>
 #include <maquette/densepose.h>
 

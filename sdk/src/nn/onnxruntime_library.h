@@ -6,7 +6,7 @@
 
 #include "core/log.h"
 
-// Of onnxruntime_c_api.h, which builds without ONNX Runtime do not have.
+// Types of onnxruntime_c_api.h, which builds without ONNX Runtime do not have.
 struct OrtApi;
 struct OrtEnv;
 struct OrtRunOptions;

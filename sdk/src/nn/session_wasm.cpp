@@ -1,3 +1,4 @@
+// The parts of this folder that ask ONNX Runtime, in builds without it.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -6,6 +7,7 @@
 #include "nn/portable/network.h"
 #include "nn/portable/network_builder.h"
 #include "nn/portable/onnx_model.h"
+#include "nn/provider.h"
 #include "nn/session.h"
 
 namespace maq {
@@ -114,6 +116,18 @@ void RunCancel::check() const {
 std::unique_ptr<Session> open_session(std::shared_ptr<const OnnxRuntimeLibrary>, const std::vector<uint8_t>& bytes,
                                       GraphSpec spec, std::string name, const SessionSettings&) {
   return std::make_unique<PortableSession>(bytes, spec, name);
+}
+
+// Sessions run on nn/portable.
+OnnxRuntimeLibrary::OnnxRuntimeLibrary(const std::string&, const Log& log) : log_(log), version_("none") {}
+
+OnnxRuntimeLibrary::~OnnxRuntimeLibrary() = default;
+
+maq_provider available_provider(const OnnxRuntimeLibrary& runtime, maq_provider wanted) {
+  if (wanted != MAQ_PROVIDER_CPU) {
+    runtime.log().write(MAQ_LOG_WARNING, "Networks run on the CPU: there are no other providers in WebAssembly.");
+  }
+  return MAQ_PROVIDER_CPU;
 }
 
 }  // namespace maq

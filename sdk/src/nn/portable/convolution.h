@@ -28,7 +28,8 @@ class TapAddresses {
  public:
   TapAddresses(const Windows& windows, int channels) : windows_(windows), zeros_(size_t(channels)) {}
 
-  // Of `count` pixels from `first` on, counted through all images; those beyond the last read zeros.
+  // Returns the addresses for `count` pixels from `first` on, counted through all images. Pixels beyond the last read
+  // zeros.
   // at()[tap * count + pixel]
   const Value* const* at(const Value* image, const Extents& input, const Extents& output, size_t first, size_t count);
 
@@ -83,7 +84,8 @@ struct FloatRange {
   float lowest = -3.4e38f, highest = 3.4e38f;
 };
 
-// A convolution of floats. run() multiplies, rounds, adds and rounds again, as WebAssembly has it.
+// A convolution of floats. run() multiplies, rounds, adds and rounds again, because WebAssembly has no fused
+// instruction.
 class FloatLayer : public Layer {
  public:
   explicit FloatLayer(const Windows& windows) : windows_(windows) {}

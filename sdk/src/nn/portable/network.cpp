@@ -7,10 +7,10 @@
 namespace maq {
 
 PortableNetwork::PortableNetwork(NetworkPlan plan) : plan_(std::move(plan)), tensors_(plan_.is_float.size()) {
-  share_memory();
+  plan_memory();
 }
 
-void PortableNetwork::share_memory() {
+void PortableNetwork::plan_memory() {
   const size_t steps = plan_.steps.size();
   std::vector<size_t> last_use(tensors_.size(), 0);
   for (size_t i = 0; i < steps; ++i) {

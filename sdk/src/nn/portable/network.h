@@ -17,7 +17,7 @@ struct Step {
   int output = 0;
 };
 
-// What an ONNX graph becomes (network_builder.h).
+// The layers of an ONNX graph (network_builder.h).
 struct NetworkPlan {
   std::vector<Step> steps;
   std::vector<bool> is_float;        // of each tensor
@@ -34,7 +34,7 @@ class PortableNetwork {
 
  private:
   // Gives tensors that are not needed at the same time the same memory.
-  void share_memory();
+  void plan_memory();
 
   NetworkPlan plan_;
   std::vector<Tensor> tensors_;

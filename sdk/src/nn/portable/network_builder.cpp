@@ -19,12 +19,12 @@ struct Value {
   bool is_float = false;
   Quantization quantization;     // of a tensor that is not of floats
   bool is_channels_last = true;  // the order of the graph's axes; memory has channels last in any case
-  // Of constants: the numbers, and if they are quantized, the scales, one or one for each output channel.
+  // For constants: the numbers, and if they are quantized, the scales, one or one for each output channel.
   const OnnxTensor* constant = nullptr;
   std::vector<float> scales;
-  // Of a result that is not written before its quantization is known: writes it and returns its tensor.
+  // For a result that waits for its quantization: writes it and returns its tensor.
   std::function<int(const Quantization&)> write_quantized;
-  // Of a result of floats: limits it, adds a bias to it.
+  // For a result of floats: limits it, adds a bias to it.
   std::function<void(const FloatRange&)> limit;
   std::function<void(const std::vector<float>&)> add_bias;
   std::string shape_of;  // of the result of Shape

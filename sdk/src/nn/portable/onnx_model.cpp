@@ -223,14 +223,14 @@ double OnnxTensor::number(size_t index) const {
   return 0;
 }
 
-int64_t OnnxNode::integer(const std::string& name, int64_t otherwise) const {
+int64_t OnnxNode::integer(const std::string& name, int64_t fallback) const {
   const auto found = attributes.find(name);
-  return found == attributes.end() ? otherwise : found->second.integer;
+  return found == attributes.end() ? fallback : found->second.integer;
 }
 
-std::vector<int64_t> OnnxNode::integers(const std::string& name, std::vector<int64_t> otherwise) const {
+std::vector<int64_t> OnnxNode::integers(const std::string& name, std::vector<int64_t> fallback) const {
   const auto found = attributes.find(name);
-  return found == attributes.end() ? otherwise : found->second.integers;
+  return found == attributes.end() ? fallback : found->second.integers;
 }
 
 OnnxModel read_onnx(const std::vector<uint8_t>& bytes, const std::string& name) {

@@ -31,8 +31,8 @@ struct OnnxNode {
   std::vector<std::string> inputs, outputs;
   std::map<std::string, OnnxAttribute> attributes;
 
-  int64_t integer(const std::string& name, int64_t otherwise) const;
-  std::vector<int64_t> integers(const std::string& name, std::vector<int64_t> otherwise) const;
+  int64_t integer(const std::string& name, int64_t fallback) const;
+  std::vector<int64_t> integers(const std::string& name, std::vector<int64_t> fallback) const;
 };
 
 // A size that the graph leaves open is -1.

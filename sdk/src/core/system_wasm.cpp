@@ -1,8 +1,11 @@
+// Memory, cores and files, in WebAssembly.
 #include <cstdint>
 #include <cstdlib>
 #include <new>
 
 #include "core/memory.h"
+#include "core/module.h"
+#include "core/worker_threads.h"
 
 namespace maq {
 
@@ -18,5 +21,13 @@ void require_memory(size_t bytes) {
 }
 
 size_t address_space_left() { return SIZE_MAX; }
+
+// The build has no threads.
+std::vector<int> allowed_cores() { return {0}; }
+int count_large_cores(const std::vector<int>& allowed, const std::string&) { return int(allowed.size()); }
+
+// There are no files: bundles come from memory.
+std::string library_folder() { return ""; }
+std::string find_shared_file(const std::string&) { return ""; }
 
 }  // namespace maq

@@ -13,7 +13,8 @@ using namespace simd;
 
 constexpr size_t kTile = 4;    // output pixels that a step computes at once
 constexpr size_t kTiles = 32;  // tiles whose inputs stay in the cache while the weights of 8 outputs are used
-constexpr int kBlock = 8;      // output channels of a step
+constexpr size_t kPixels = kTile * kTiles;
+constexpr int kBlock = 8;  // output channels of a step
 
 int blocks_of(int channels) { return (channels + kBlock - 1) / kBlock; }
 
@@ -109,7 +110,6 @@ void QuantizedConvolution::run(const std::vector<const Tensor*>& inputs, Tensor&
   const Tensor& input = *inputs[0];
   const int taps = windows_.taps();
   const size_t pixels = output.pixels(), block_weights = size_t(taps) * size_t(inputs_) * kBlock;
-  constexpr size_t kPixels = kTile * kTiles;
   for (size_t first = 0; first < pixels; first += kPixels) {
     const size_t count = std::min(kPixels, (pixels - first + kTile - 1) / kTile * kTile);
     const int16_t* const* addresses = addresses_.at(input.quantized, input.extents, output.extents, first, count);
@@ -181,20 +181,24 @@ Extents QuantizedDepthwise::output_extents(const std::vector<const Tensor*>& inp
 
 void QuantizedDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
   const Tensor& input = *inputs[0];
-  const int taps = windows_.taps();
-  const size_t pixels = output.pixels();
-  for (size_t pixel = 0; pixel < pixels; ++pixel) {
-    const int16_t* const* from = addresses_.at(input.quantized, input.extents, output.extents, pixel, 1);
-    const int16_t* weights = weights_.data();
-    int16_t* to = output.quantized + pixel * size_t(channels_);
-    for (int channel = 0; channel < channels_; channel += kBlock) {
-      Ints low = load(bias_.data() + channel), high = load(bias_.data() + channel + 4);
-      for (int tap = 0; tap < taps; tap += 2, weights += 2 * kBlock) {
-        const Ints a = load(from[tap] + channel), b = tap + 1 < taps ? load(from[tap + 1] + channel) : zeros();
-        low = add_ints(low, multiply_pairs(interleave_low(a, b), load(weights)));
-        high = add_ints(high, multiply_pairs(interleave_high(a, b), load(weights + 8)));
+  const size_t taps = size_t(windows_.taps()), pixels = output.pixels();
+  int16_t* to = output.quantized;
+  for (size_t first = 0; first < pixels; first += kPixels) {
+    const size_t count = std::min(kPixels, pixels - first);
+    const int16_t* const* addresses = addresses_.at(input.quantized, input.extents, output.extents, first, count);
+    for (size_t pixel = 0; pixel < count; ++pixel, to += channels_) {
+      const int16_t* const* from = addresses + pixel;
+      const int16_t* weights = weights_.data();
+      for (int channel = 0; channel < channels_; channel += kBlock) {
+        Ints low = load(bias_.data() + channel), high = load(bias_.data() + channel + 4);
+        for (size_t tap = 0; tap < taps; tap += 2, weights += 2 * kBlock) {
+          const Ints a = load(from[tap * count] + channel);
+          const Ints b = tap + 1 < taps ? load(from[(tap + 1) * count] + channel) : zeros();
+          low = add_ints(low, multiply_pairs(interleave_low(a, b), load(weights)));
+          high = add_ints(high, multiply_pairs(interleave_high(a, b), load(weights + 8)));
+        }
+        store(to + channel, quantize(low, high, scales_.data() + channel, to_));
       }
-      store(to + channel, quantize(low, high, scales_.data() + channel, to_));
     }
   }
 }
@@ -229,7 +233,6 @@ void FloatConvolution::run(const std::vector<const Tensor*>& inputs, Tensor& out
   const int taps = windows_.taps();
   const size_t pixels = output.pixels(), block_weights = size_t(taps) * size_t(inputs_) * kBlock;
   const Floats lowest = repeat(range_.lowest), highest = repeat(range_.highest);
-  constexpr size_t kPixels = kTile * kTiles;
   for (size_t first = 0; first < pixels; first += kPixels) {
     const size_t count = std::min(kPixels, (pixels - first + kTile - 1) / kTile * kTile);
     const float* const* addresses = addresses_.at(input.floats, input.extents, output.extents, first, count);
@@ -325,18 +328,21 @@ Extents FloatDepthwise::output_extents(const std::vector<const Tensor*>& inputs)
 
 void FloatDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
   const Tensor& input = *inputs[0];
-  const int taps = windows_.taps();
+  const size_t taps = size_t(windows_.taps()), pixels = output.pixels();
   const Floats lowest = repeat(range_.lowest), highest = repeat(range_.highest);
-  for (size_t pixel = 0; pixel < output.pixels(); ++pixel) {
-    const float* const* from = addresses_.at(input.floats, input.extents, output.extents, pixel, 1);
-    float* to = output.floats + pixel * size_t(channels_);
-    for (int channel = 0; channel < channels_; channel += 4) {
-      Floats sum = repeat(0.0f);
-      const float* weights = weights_.data() + channel;
-      for (int tap = 0; tap < taps; ++tap, weights += channels_) {
-        sum = add(sum, multiply(load(from[tap] + channel), load(weights)));
+  float* to = output.floats;
+  for (size_t first = 0; first < pixels; first += kPixels) {
+    const size_t count = std::min(kPixels, pixels - first);
+    const float* const* addresses = addresses_.at(input.floats, input.extents, output.extents, first, count);
+    for (size_t pixel = 0; pixel < count; ++pixel, to += channels_) {
+      for (int channel = 0; channel < channels_; channel += 4) {
+        Floats sum = repeat(0.0f);
+        const float* weights = weights_.data() + channel;
+        for (size_t tap = 0; tap < taps; ++tap, weights += channels_) {
+          sum = add(sum, multiply(load(addresses[tap * count + pixel] + channel), load(weights)));
+        }
+        store(to + channel, at_most(at_least(add(sum, load(bias_.data() + channel)), lowest), highest));
       }
-      store(to + channel, at_most(at_least(add(sum, load(bias_.data() + channel)), lowest), highest));
     }
   }
 }

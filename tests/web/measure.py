@@ -1,6 +1,6 @@
 """Processor time of a frame, native and in WebAssembly, one thread, in turn.
 
-    python -m tests.web.measure              after `make build web`
+python -m tests.web.measure              after `make build web`
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import time
 from pathlib import Path
 
 import cv2
-import numpy as np
-
 import maquette
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,7 +33,8 @@ def main() -> None:
 
     command = ["node", str(ROOT / "tests/web/measure.js"), str(raw), "640", "480", str(options.frames)]
     node = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert node.stdin and node.stdout and node.stdout.readline() == "ready\n"
+    assert node.stdin and node.stdout
+    assert node.stdout.readline() == "ready\n"
     native, web = [], []
     with maquette.DensePose(threads=1) as densepose:
         for _ in range(10):

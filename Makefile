@@ -44,8 +44,8 @@ test: packages-test  ## native tests, Python tests and programs of users, with t
 	@JOBS=$(JOBS) scripts/test.sh
 
 .PHONY: test-all
-test-all: packages-test-all  ## `test`, and sanitizers, aarch64 emulated, Android, cameras in a virtual machine
-	@JOBS=$(JOBS) scripts/test.sh python camera-vm aarch64 android asan tsan release
+test-all: packages-test-all  ## `test`, and sanitizers, aarch64 emulated, Android, browsers, cameras in a virtual machine
+	@JOBS=$(JOBS) scripts/test.sh python camera-vm aarch64 android web asan tsan release
 
 .PHONY: test-isa
 test-isa: build packages-test  ## native tests and labels on aarch64 and on AVX2 without VNNI, emulated; a part of it is in `test-all`
@@ -99,6 +99,14 @@ test-android: android  ## the AAR's parts, the Kotlin API on this machine's Java
 test-newcomer:  ## the commands of README.md in a bare Debian, from top to bottom; needs root; not part of `test-all`
 	@scripts/install-packages.sh newcomer
 	@$(PYTHON) -m tests.newcomer
+
+.PHONY: web
+web: packages-web  ## dense pose for browsers and node: the npm package and a page, into build/web (web/README.md)
+	@scripts/web/build.sh $(JOBS)
+
+.PHONY: test-web
+test-web: web packages-test build  ## the npm package in node and the page in Chromium, beside the native library; part of `test-all`
+	@scripts/web/test.sh
 
 .PHONY: release
 release: build wheel android  ## all packages with checksums, signature and SBOM, into build/dist (docs/reference/packages.md)
@@ -162,9 +170,9 @@ lint: packages-lint packages-test  ## check layout and lint rules without changi
 clean:  ## remove builds and demo output (keeps fetched packages, data and .venv)
 	@rm -rf build demo-output
 
-.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows packages-test-all
-packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows: packages-%:
+.PHONY: packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows packages-web packages-test-all
+packages-demo packages-desktop packages-test packages-lint packages-fuzz packages-wheel packages-windows packages-web: packages-%:
 	@scripts/install-packages.sh $*
 
 packages-test-all:  # a group whose packages cannot be installed prints why it is not run
-	@scripts/install-packages.sh test isa camera-vm android || scripts/install-packages.sh test
+	@scripts/install-packages.sh test isa camera-vm android web || scripts/install-packages.sh test

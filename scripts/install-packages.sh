@@ -11,6 +11,7 @@
 #   scripts/install-packages.sh android     to build the SDK, and: Java, Maven, a compiler and linker for Android (350 MB)
 #   scripts/install-packages.sh wheel       to build the SDK, and: what builds codecs from source
 #   scripts/install-packages.sh windows     to build the SDK, and: a compiler for Windows, what builds codecs, Wine (1.2 GB)
+#   scripts/install-packages.sh web         to build the SDK, and: emscripten (650 MB), and Chromium, to test it
 #   scripts/install-packages.sh newcomer    + debootstrap, which makes a bare Debian, and qemu for one of arm64
 #   scripts/install-packages.sh release     to pack and check a release: debhelper, lintian, minisign
 #   scripts/install-packages.sh site        to build the site: Doxygen, Maven; and Chromium, to test it
@@ -19,11 +20,11 @@
 # Says what it is going to install before it does, asks sudo when not root, and fails when a package cannot be had.
 set -euo pipefail
 
-usage() { sed -n '2,18s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,19s/^# \{0,1\}//p' "$0"; }
 
 for group in "${@:-}"; do
     case "$group" in
-        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | wheel | windows | release | site) ;;
+        demo | desktop | test | isa | camera-vm | lint | fuzz | android | newcomer | wheel | windows | web | release | site) ;;
         -h | --help) usage; exit 0 ;;
         *) usage >&2; exit 2 ;;
     esac
@@ -133,6 +134,11 @@ fi
 if wants newcomer; then
     needs_command debootstrap debootstrap
     needs_command qemu-aarch64-static qemu-user-static
+fi
+if wants web; then
+    needs_command emcc emscripten
+    needs_package node-acorn          # emscripten needs it, and Debian only recommends it where node is another one
+    needs_command chromium chromium   # shows the page to the tests
 fi
 if wants site; then
     needs_command doxygen doxygen

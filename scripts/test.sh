@@ -8,6 +8,7 @@
 #   asan, tsan  native tests with sanitizers; tsan: those with threads
 #   aarch64     a part of the native tests for aarch64, emulated
 #   android     the parts of the AAR, and the Kotlin API on this machine's Java
+#   web         the npm package in node, and its page in Chromium
 #   camera-vm   cameras of a real kernel in a virtual machine
 #
 # A test that fails is run once more, alone, at the end. When it passes then, the run passes, and the last lines name
@@ -15,7 +16,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.."
 results=build/test-results
-usage() { sed -n '2,14s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '2,15s/^# \{0,1\}//p' "$0"; }
 
 # native BUILD REPORT [CTEST_OPTION...]: the native tests of one build.
 native() {
@@ -46,6 +47,7 @@ run() {
         tsan) built tsan && native tsan "$results/ctest-tsan.xml" -L threads ;;
         aarch64) scripts/test-isa.sh 1 core ;;
         android) scripts/android/build.sh 1 arm64-v8a && scripts/android/test.sh ;;
+        web) scripts/web/build.sh 1 && scripts/web/test.sh "$results" ;;
         camera-vm) tests/camera_vm/run.sh ;;
     esac
 }
@@ -109,7 +111,7 @@ group() {
     run "$1" >"$log" 2>&1 || status=$?
     measure_cpu
     case "$1 $status" in
-        "camera-vm 77" | "aarch64 77") echo "# $1 not run: $(tail -n 1 "$log")"; return ;;
+        "camera-vm 77" | "aarch64 77" | "web 77") echo "# $1 not run: $(tail -n 1 "$log")"; return ;;
         *" 0") echo "# $1 passed in $SECONDS s, CPU time $cpu_s s"; grep -hE '^SKIPPED|\*\*\*(Skipped|Not Run)' "$log"; return 0 ;;
     esac
     touch "$results/$1.failed"
@@ -146,7 +148,7 @@ esac
 sanitized=()
 for name; do
     case "$name" in
-        release | python | camera-vm | aarch64 | android) ;;
+        release | python | camera-vm | aarch64 | android | web) ;;
         asan | tsan) sanitized+=("$name") ;;
         *) usage >&2; exit 2 ;;
     esac

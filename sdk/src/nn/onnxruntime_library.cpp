@@ -1,5 +1,7 @@
 #include "nn/onnxruntime_library.h"
 
+#include <onnxruntime_c_api.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdlib>

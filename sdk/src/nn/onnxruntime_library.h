@@ -1,12 +1,16 @@
 // ONNX Runtime, opened privately at run time so that an app with its own copy does not clash.
 #pragma once
 
-#include <onnxruntime_c_api.h>
-
 #include <memory>
 #include <string>
 
 #include "core/log.h"
+
+// Types of onnxruntime_c_api.h, which builds without ONNX Runtime do not have.
+struct OrtApi;
+struct OrtEnv;
+struct OrtRunOptions;
+struct OrtStatus;
 
 namespace maq {
 

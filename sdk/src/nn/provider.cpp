@@ -1,5 +1,7 @@
 #include "nn/provider.h"
 
+#include <onnxruntime_c_api.h>
+
 #include <cstring>
 #include <memory>
 

@@ -7,6 +7,9 @@
 
 #include "nn/onnxruntime_library.h"
 
+struct OrtSession;
+struct OrtSessionOptions;
+
 namespace maq {
 
 // `wanted`, or MAQ_PROVIDER_CPU where this build of ONNX Runtime does not offer it; the log says why.

@@ -1,12 +1,16 @@
 #include "nn/session.h"
 
+#include <onnxruntime_c_api.h>
+
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
 #include "core/memory.h"
 #include "nn/provider.h"
+#include "nn/session_threads.h"
 
 namespace maq {
 namespace {
@@ -77,16 +81,63 @@ void RunCancel::check() const {
   if (is_cancelled_) throw Error(MAQ_CANCELLED, "The app cancelled the run.");
 }
 
+// A network that ONNX Runtime runs.
+class OnnxRuntimeSession final : public Session {
+ public:
+  OnnxRuntimeSession(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes,
+                     GraphSpec spec, std::string name, const SessionSettings& settings);
+  ~OnnxRuntimeSession() override;
+
+  const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
+                                     const RunCancel* cancel, float* first_output) override;
+  maq_provider provider() const override { return provider_; }
+
+ private:
+  struct GraphSide;
+
+  void open(const std::vector<uint8_t>& bytes, const SessionSettings& settings);
+
+  void compare_with_spec() const;
+  // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
+  size_t compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const;
+
+  // A tensor as ONNX Runtime wants it, made anew only when its address or shape changes.
+  struct Binding {
+    OrtValue* value = nullptr;
+    const float* data = nullptr;
+    Shape shape;
+  };
+  void bind(Binding& binding, const float* data, const Shape& shape);
+  // Throws MAQ_ERROR_INFERENCE for an error.
+  void check_run(OrtStatus* status) const;
+  void release();
+
+  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
+  GraphSpec spec_;
+  std::string name_;
+  maq_provider provider_ = MAQ_PROVIDER_CPU;
+  std::optional<SessionThreads> threads_;
+  OrtSession* session_ = nullptr;
+  OrtMemoryInfo* cpu_memory_ = nullptr;
+  std::vector<const char*> input_names_, output_names_;
+  std::vector<Binding> inputs_, outputs_;
+  std::vector<const OrtValue*> input_values_;
+  std::vector<OrtValue*> output_values_;
+  std::vector<std::vector<float>> buffers_;  // memory of the outputs
+  std::vector<TensorView> views_;
+};
+
 // ONNX Runtime asks the same of inputs and of outputs, by functions of different names.
-struct Session::GraphSide {
+struct OnnxRuntimeSession::GraphSide {
   const char* kind;
   decltype(OrtApi::SessionGetInputCount) count;
   decltype(OrtApi::SessionGetInputName) name;
   decltype(OrtApi::SessionGetInputTypeInfo) type;
 };
 
-Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
-                 std::string name, const SessionSettings& settings)
+OnnxRuntimeSession::OnnxRuntimeSession(std::shared_ptr<const OnnxRuntimeLibrary> runtime,
+                                       const std::vector<uint8_t>& bytes, GraphSpec spec, std::string name,
+                                       const SessionSettings& settings)
     : runtime_(std::move(runtime)), spec_(std::move(spec)), name_(std::move(name)), provider_(settings.provider) {
   const OrtApi& api = runtime_->api();
   try {
@@ -116,9 +167,9 @@ Session::Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::v
   }
 }
 
-Session::~Session() { release(); }
+OnnxRuntimeSession::~OnnxRuntimeSession() { release(); }
 
-void Session::open(const std::vector<uint8_t>& bytes, const SessionSettings& settings) {
+void OnnxRuntimeSession::open(const std::vector<uint8_t>& bytes, const SessionSettings& settings) {
   const OrtApi& api = runtime_->api();
   const auto check = [&](OrtStatus* result) {
     runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be loaded"));
@@ -159,7 +210,7 @@ void Session::open(const std::vector<uint8_t>& bytes, const SessionSettings& set
   if (provider_ != MAQ_PROVIDER_CPU) check_assignment(*runtime_, provider_, session_, name_);
 }
 
-void Session::release() {
+void OnnxRuntimeSession::release() {
   const OrtApi& api = runtime_->api();
   for (std::vector<Binding>* side : {&inputs_, &outputs_}) {
     for (const Binding& binding : *side) api.ReleaseValue(binding.value);
@@ -168,7 +219,7 @@ void Session::release() {
   api.ReleaseSession(session_);
 }
 
-void Session::compare_with_spec() const {
+void OnnxRuntimeSession::compare_with_spec() const {
   const OrtApi& api = runtime_->api();
   const GraphSide inputs{"input", api.SessionGetInputCount, api.SessionGetInputName, api.SessionGetInputTypeInfo};
   const GraphSide outputs{"output", api.SessionGetOutputCount, api.SessionGetOutputName, api.SessionGetOutputTypeInfo};
@@ -180,7 +231,7 @@ void Session::compare_with_spec() const {
   }
 }
 
-size_t Session::compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const {
+size_t OnnxRuntimeSession::compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const {
   const auto check = [&](OrtStatus* result) {
     runtime_->check(result, MAQ_ERROR_BAD_BUNDLE, concatenate(name_, " cannot be inspected"));
   };
@@ -225,11 +276,11 @@ size_t Session::compare_side(const GraphSide& side, const std::vector<TensorSpec
   return count;
 }
 
-void Session::check_run(OrtStatus* status) const {
+void OnnxRuntimeSession::check_run(OrtStatus* status) const {
   if (status != nullptr) runtime_->check(status, MAQ_ERROR_INFERENCE, concatenate(name_, " failed to run"));
 }
 
-void Session::bind(Binding& binding, const float* data, const Shape& shape) {
+void OnnxRuntimeSession::bind(Binding& binding, const float* data, const Shape& shape) {
   if (binding.value != nullptr && binding.data == data && binding.shape == shape) return;
   const OrtApi& api = runtime_->api();
   api.ReleaseValue(binding.value);
@@ -244,9 +295,9 @@ void Session::bind(Binding& binding, const float* data, const Shape& shape) {
   binding.shape = shape;
 }
 
-const std::vector<TensorView>& Session::run(const std::vector<TensorView>& inputs,
-                                            const std::vector<Shape>& output_shapes, const RunCancel* cancel,
-                                            float* first_output) {
+const std::vector<TensorView>& OnnxRuntimeSession::run(const std::vector<TensorView>& inputs,
+                                                       const std::vector<Shape>& output_shapes, const RunCancel* cancel,
+                                                       float* first_output) {
   for (size_t i = 0; i < inputs_.size(); ++i) {
     bind(inputs_[i], inputs[i].data, inputs[i].shape);
     input_values_[i] = inputs_[i].value;
@@ -271,6 +322,12 @@ const std::vector<TensorView>& Session::run(const std::vector<TensorView>& input
   }
   check_run(status);
   return views_;
+}
+
+std::unique_ptr<Session> open_session(std::shared_ptr<const OnnxRuntimeLibrary> runtime,
+                                      const std::vector<uint8_t>& bytes, GraphSpec spec, std::string name,
+                                      const SessionSettings& settings) {
+  return std::make_unique<OnnxRuntimeSession>(std::move(runtime), bytes, std::move(spec), std::move(name), settings);
 }
 
 }  // namespace maq

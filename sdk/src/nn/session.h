@@ -8,13 +8,11 @@
 #include <initializer_list>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "nn/manifest.h"
 #include "nn/onnxruntime_library.h"
-#include "nn/session_threads.h"
 
 namespace maq {
 
@@ -72,7 +70,7 @@ class RunCancel {
   void reset() noexcept;
 
  private:
-  friend class Session;
+  friend class OnnxRuntimeSession;
 
   std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
   OrtRunOptions* options_ = nullptr;
@@ -80,13 +78,11 @@ class RunCancel {
   std::atomic<bool> is_cancelled_{false};
 };
 
+// A network that is ready to run.
 class Session {
  public:
-  // Prepares `bytes` (an ONNX model without external data) to run, and compares its inputs and outputs with `spec`.
-  // `name` names it in errors. Throws MAQ_ERROR_BAD_BUNDLE.
-  Session(std::shared_ptr<const OnnxRuntimeLibrary> runtime, const std::vector<uint8_t>& bytes, GraphSpec spec,
-          std::string name, const SessionSettings& settings);
-  ~Session();
+  Session() = default;
+  virtual ~Session() = default;
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -95,45 +91,18 @@ class Session {
   // Throws MAQ_ERROR_INFERENCE, also when an output has another shape; MAQ_CANCELLED, between two nodes of the graph,
   // where `cancel` says so. `first_output`: memory for the first output instead of the session's. It may be an input's
   // memory if the graph reads that input before it writes.
-  const std::vector<TensorView>& run(const std::vector<TensorView>& inputs, const std::vector<Shape>& output_shapes,
-                                     const RunCancel* cancel = nullptr, float* first_output = nullptr);
+  virtual const std::vector<TensorView>& run(const std::vector<TensorView>& inputs,
+                                             const std::vector<Shape>& output_shapes, const RunCancel* cancel = nullptr,
+                                             float* first_output = nullptr) = 0;
 
   // The one in use.
-  maq_provider provider() const { return provider_; }
-
- private:
-  struct GraphSide;
-
-  void open(const std::vector<uint8_t>& bytes, const SessionSettings& settings);
-
-  void compare_with_spec() const;
-  // Throws unless the graph has each of `expected` with its type and shape; returns how many it has in all.
-  size_t compare_side(const GraphSide& side, const std::vector<TensorSpec>& expected) const;
-
-  // A tensor as ONNX Runtime wants it, made anew only when its address or shape changes.
-  struct Binding {
-    OrtValue* value = nullptr;
-    const float* data = nullptr;
-    Shape shape;
-  };
-  void bind(Binding& binding, const float* data, const Shape& shape);
-  // Throws MAQ_ERROR_INFERENCE for an error.
-  void check_run(OrtStatus* status) const;
-  void release();
-
-  std::shared_ptr<const OnnxRuntimeLibrary> runtime_;
-  GraphSpec spec_;
-  std::string name_;
-  maq_provider provider_ = MAQ_PROVIDER_CPU;
-  std::optional<SessionThreads> threads_;
-  OrtSession* session_ = nullptr;
-  OrtMemoryInfo* cpu_memory_ = nullptr;
-  std::vector<const char*> input_names_, output_names_;
-  std::vector<Binding> inputs_, outputs_;
-  std::vector<const OrtValue*> input_values_;
-  std::vector<OrtValue*> output_values_;
-  std::vector<std::vector<float>> buffers_;  // memory of the outputs
-  std::vector<TensorView> views_;
+  virtual maq_provider provider() const = 0;
 };
+
+// Prepares `bytes` (an ONNX model without external data) to run, and compares its inputs and outputs with `spec`.
+// `name` names it in errors. Throws MAQ_ERROR_BAD_BUNDLE. ONNX Runtime runs it; in WebAssembly, nn/portable does.
+std::unique_ptr<Session> open_session(std::shared_ptr<const OnnxRuntimeLibrary> runtime,
+                                      const std::vector<uint8_t>& bytes, GraphSpec spec, std::string name,
+                                      const SessionSettings& settings);
 
 }  // namespace maq

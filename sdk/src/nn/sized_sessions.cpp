@@ -47,7 +47,7 @@ Session& SizedSessions::at(int width_px, int height_px) {
       if (const auto size = size_of(*name, width_px, height_px)) settings.fixed_sizes.emplace_back(*name, *size);
     }
   }
-  kept_.push_front({width_px, height_px, std::make_unique<Session>(runtime_, bytes_, spec_, name_, settings)});
+  kept_.push_front({width_px, height_px, open_session(runtime_, bytes_, spec_, name_, settings)});
   return *kept_.front().session;
 }
 

@@ -2,6 +2,7 @@
 #include <sys/resource.h>
 
 #include <gtest/gtest.h>
+#include <onnxruntime_c_api.h>
 
 #include <algorithm>
 #include <cmath>
@@ -140,9 +141,9 @@ class ShippedNetworks : public ::testing::Test {
 
   static maq::DensePose make(const maq::DensePoseSettings& settings = {}) { return {runtime_, *bundle_, settings}; }
 
-  static maq::Session session(const std::string& graph, int threads = 1) {
+  static std::unique_ptr<maq::Session> session(const std::string& graph, int threads = 1) {
     const maq::GraphSpec& spec = bundle_->manifest.graphs.at(graph);
-    return {runtime_, bundle_->files.at(spec.file), spec, graph, {threads}};
+    return maq::open_session(runtime_, bundle_->files.at(spec.file), spec, graph, {threads});
   }
 
   static maq::DensePoseResult run(const cv::Mat& bgr, const maq::DensePoseSettings& settings = {}) {
@@ -191,8 +192,8 @@ class ShippedNetworks : public ::testing::Test {
   // Features of the photo at the finest level.
   static std::vector<float> finest_features() {
     const std::vector<float> image = trunk_input();
-    maq::Session trunk = session("trunk");
-    const maq::TensorView p2 = trunk.run({{image.data(), {1, 3, kSide, kSide}}}, trunk_shapes())[0];
+    const auto trunk = session("trunk");
+    const maq::TensorView p2 = trunk->run({{image.data(), {1, 3, kSide, kSide}}}, trunk_shapes())[0];
     return {p2.data, p2.data + size_of(p2.shape)};
   }
 
@@ -244,8 +245,8 @@ constexpr double kMaxEvidenceError = 0.5;
 TEST_F(ShippedNetworks, TheOptimisedTrunkAnswersAsTheUnoptimisedOne) {
   const std::vector<float> image = trunk_input();
   const std::vector<maq::TensorView> input = {{image.data(), {1, 3, kSide, kSide}}};
-  maq::Session trunk = session("trunk");
-  const Tensors optimised = copies(trunk.run(input, trunk_shapes()));
+  const auto trunk = session("trunk");
+  const Tensors optimised = copies(trunk->run(input, trunk_shapes()));
   const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, "trunk").run(input);
   ASSERT_EQ(optimised.size(), plain.size());
   ASSERT_EQ(optimised.size(), 6u);
@@ -260,8 +261,8 @@ TEST_F(ShippedNetworks, TheOptimisedHeadsAnswerAsTheUnoptimisedOnes) {
   for (const Head& head : heads()) {
     const std::vector<float> pooled = rois(features, 2, head.pool);
     const std::vector<maq::TensorView> input = {{pooled.data(), {2, head.pool, head.pool, 64}}};
-    maq::Session optimised_head = session(head.graph);
-    const Tensors optimised = copies(optimised_head.run(input, for_people(head.outputs, 2)));
+    const auto optimised_head = session(head.graph);
+    const Tensors optimised = copies(optimised_head->run(input, for_people(head.outputs, 2)));
     const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, head.graph).run(input);
     ASSERT_EQ(optimised.size(), plain.size());
     for (size_t i = 0; i < plain.size(); ++i) {
@@ -279,8 +280,8 @@ TEST_F(ShippedNetworks, TheOptimisedHeadsAnswerAsTheUnoptimisedOnes) {
 TEST_F(ShippedNetworks, TheOptimisedRpnAnswersAsTheUnoptimisedOne) {
   const std::vector<float> features = finest_features();
   const std::vector<maq::TensorView> input = {{features.data(), {1, kSide / 4, kSide / 4, 64}}};
-  maq::Session rpn = session("rpn_fine");
-  const Tensors optimised = copies(rpn.run(input, {{1, kSide / 4, kSide / 4, 15}}));
+  const auto rpn = session("rpn_fine");
+  const Tensors optimised = copies(rpn->run(input, {{1, kSide / 4, kSide / 4, 15}}));
   const Tensors plain = UnoptimisedGraph(*runtime_, *bundle_, "rpn_fine").run(input);
   for (size_t i = 0; i < plain.size(); ++i) EXPECT_LE(relative_error(plain[i], optimised[i]), kMaxOptimisingError) << i;
 }
@@ -293,12 +294,12 @@ TEST_F(ShippedNetworks, ABatchOfPeopleIsAnsweredAsOneByOne) {
   for (const Head& head : heads()) {
     const std::vector<float> pooled = rois(features, kPeople, head.pool);
     const size_t roi_size = pooled.size() / kPeople;
-    maq::Session network = session(head.graph);
+    const auto network = session(head.graph);
     const Tensors batch =
-        copies(network.run({{pooled.data(), {kPeople, head.pool, head.pool, 64}}}, for_people(head.outputs, kPeople)));
+        copies(network->run({{pooled.data(), {kPeople, head.pool, head.pool, 64}}}, for_people(head.outputs, kPeople)));
     for (size_t k = 0; k < kPeople; ++k) {
       const Tensors alone =
-          copies(network.run({{pooled.data() + k * roi_size, {1, head.pool, head.pool, 64}}}, head.outputs));
+          copies(network->run({{pooled.data() + k * roi_size, {1, head.pool, head.pool, 64}}}, head.outputs));
       for (size_t i = 0; i < alone.size(); ++i) {
         const std::vector<float>& all = batch[i];
         const float largest = std::abs(

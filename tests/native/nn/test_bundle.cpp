@@ -17,7 +17,7 @@ std::shared_ptr<const maq::OnnxRuntimeLibrary> runtime() {
 void open_graphs(const maq::Bundle& bundle) {
   const auto library = runtime();
   for (const auto& [name, graph] : bundle.manifest.graphs) {
-    maq::Session(library, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), {});
+    maq::open_session(library, bundle.files.at(graph.file), graph, bundle.path_of(graph.file), {});
   }
 }
 

@@ -19,7 +19,7 @@ std::unique_ptr<Session> DensePoseNetworks::open(const std::string& name, GraphS
                                                  const std::vector<std::vector<int64_t>>& outputs,
                                                  const SessionSettings& with) const {
   require_shapes(graph, input, outputs, concatenate("Bundle ", bundle_.manifest.name, ": graph ", name, ": "));
-  return std::make_unique<Session>(runtime_, bundle_.files.at(graph.file), graph, bundle_.path_of(graph.file), with);
+  return open_session(runtime_, bundle_.files.at(graph.file), graph, bundle_.path_of(graph.file), with);
 }
 
 }  // namespace maq

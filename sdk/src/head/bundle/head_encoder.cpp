@@ -74,7 +74,7 @@ HeadEncoder::HeadEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, cons
     settings.threads = measure_threads(runtime, timed, settings);
   }
   threads_ = settings.threads;
-  session_ = std::make_unique<Session>(std::move(runtime), bytes, graph, name, settings);
+  session_ = open_session(std::move(runtime), bytes, graph, name, settings);
 }
 
 void HeadEncoder::run(const ImageView& photo, const HeadSquare& square, const RunCancel& cancel,

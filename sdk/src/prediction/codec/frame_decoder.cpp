@@ -32,7 +32,7 @@ void FrameDecoder::look_up(const uint16_t* codes) {
 const float* FrameDecoder::run(const uint16_t* codes) {
   look_up(codes);
   if (session_ == nullptr) {
-    session_ = std::make_unique<Session>(runtime_, bytes_, graph_, name_, settings_);
+    session_ = open_session(runtime_, bytes_, graph_, name_, settings_);
     bytes_ = {};
   }
   inputs_.assign(1, {features_.data(), input_shape_});

@@ -27,7 +27,7 @@ FrameEncoder::FrameEncoder(std::shared_ptr<const OnnxRuntimeLibrary> runtime, co
         measure_threads(runtime, {bytes, graph, name, frame_px_, frame_px_, input_shape_, output_shapes_}, settings);
   }
   threads_ = settings.threads;
-  session_ = std::make_unique<Session>(std::move(runtime), bytes, graph, name, settings);
+  session_ = open_session(std::move(runtime), bytes, graph, name, settings);
 }
 
 void FrameEncoder::resize(const ImageView& image) {

@@ -21,7 +21,7 @@ struct TransformerBundle {
 
     std::unique_ptr<Session> open(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime,
                                   const SessionSettings& settings) const {
-      return std::make_unique<Session>(runtime, bytes, spec, name, settings);
+      return open_session(runtime, bytes, spec, name, settings);
     }
   };
 

@@ -1,0 +1,150 @@
+// The page in headless Chromium.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { frames, launch, openPage, pageFolder, serve, status, waitForFrames } from './browser.js';
+import { converted, scratch } from './native.js';
+
+let server;
+let browser;
+before(async () => {
+  server = await serve(pageFolder);
+  browser = await launch();
+});
+after(async () => {
+  await browser?.close();
+  server?.close();
+});
+
+async function withPage(work, options) {
+  const opened = await openPage(browser, server.url, options);
+  try {
+    await work(opened);
+  } finally {
+    await opened.page.close();
+  }
+}
+
+test('a camera shows people, nothing is asked of another host, and a report can be copied', async () => {
+  await withPage(async ({ page, requests, problems }) => {
+    await page.click('#camera');
+    await waitForFrames(page, 10);
+    assert.equal(await page.evaluate(() => document.body.dataset.people), '1');
+    for (const kind of ['contours', 'people', 'none']) await page.select('#overlay', kind);
+    await page.click('#report');
+    const report = JSON.parse(await page.evaluate(() => document.body.dataset.report));
+    assert.equal(report.format, 'maquette-web-report');
+    assert.deepEqual(report.image, [640, 480]);
+    assert.ok(report.frameMs.p50 > 0 && report.stagesMs.trunk.p50 > 0);
+    console.log(`in Chromium: ${report.framesPerSecond} frames a second, ${JSON.stringify(report.stagesMs.total)} ms, first overlay after ${report.firstOverlayMs.toFixed(0)} ms`);
+    await page.click('#camera');
+    const stopped = await frames(page);
+    await new Promise((resolve) => setTimeout(resolve, 1500));
+    assert.ok((await frames(page)) <= stopped + 1, 'a stopped camera gives no more frames');
+    for (const url of requests) assert.ok(url.startsWith(server.url) || /^(data|blob):/.test(url), url);
+    assert.deepEqual(problems, []);
+  });
+});
+
+test('the Content-Security-Policy forbids requests to other hosts', async () => {
+  await withPage(async ({ page }) => {
+    const answer = await page.evaluate(() => fetch('http://127.0.0.2/').then(() => 'sent', (error) => error.name));
+    assert.equal(answer, 'TypeError');
+    const policy = await page.$eval('meta[http-equiv]', (element) => element.content);
+    assert.match(policy, /default-src 'none'/);
+    assert.match(policy, /connect-src 'self'/);
+    assert.doesNotMatch(policy, /unsafe-inline|'unsafe-eval'|https?:|\*/);
+  });
+});
+
+test('a photo shows its people, and a bad file a sentence', async () => {
+  await withPage(async ({ page }) => {
+    const photo = converted('photo.png');
+    await (await page.$('#file')).uploadFile(photo);
+    await waitForFrames(page, 1);
+    assert.equal(await page.evaluate(() => document.body.dataset.people), '1');
+    const bad = join(scratch, 'bad.png');
+    writeFileSync(bad, 'no image');
+    await (await page.$('#file')).uploadFile(bad);
+    await page.waitForFunction(() => document.getElementById('status').textContent.includes('no image or clip'));
+  });
+});
+
+test('a camera that is denied gets a sentence', async () => {
+  const denying = await launch({ allowsCamera: false });
+  try {
+    const { page } = await openPage(denying, server.url);
+    await page.click('#camera');
+    await page.waitForFunction(() => document.getElementById('status').textContent.includes('not allowed'));
+  } finally {
+    await denying.close();
+  }
+});
+
+// Loads the page from a server with a fault, and returns what it says.
+async function saidWith(fault, text) {
+  const faulty = await serve(pageFolder, fault);
+  const { page } = await openPage(browser, faulty.url, { loads: false });
+  try {
+    await page.waitForFunction((part) => document.getElementById('status').textContent.includes(part), {}, text);
+    return await status(page);
+  } finally {
+    await page.close();
+    faulty.close();
+  }
+}
+
+test('a browser that cannot compile the core is told what is needed', async () => {
+  assert.match(await saidWith({ damaged: /core.*wasm$/ }, 'does not start'), /Chrome 95, Firefox 100, Safari 16.4/);
+});
+
+test('networks that are missing, and a worker that is lost, get a sentence', async () => {
+  assert.match(await saidWith({ missing: /networks/ }, '404'), /networks.*404/);
+  assert.match(await saidWith({ missing: /worker/ }, 'worker'), /The worker of dense pose ended/);
+});
+
+test('a tab that is hidden stops, and goes on when it is shown', async () => {
+  await withPage(async ({ page }) => {
+    await page.click('#camera');
+    await waitForFrames(page, 3);
+    const other = await browser.newPage();
+    await other.bringToFront();
+    await new Promise((resolve) => setTimeout(resolve, 1000));
+    await page.bringToFront();
+    await other.close();
+    await waitForFrames(page, (await frames(page)) + 5);
+  });
+});
+
+test('memory does not grow with frames', async () => {
+  await withPage(async ({ page }) => {
+    await page.select('#size', '224');
+    await page.waitForFunction(() => !document.getElementById('camera').disabled);
+    await page.click('#camera');
+    await waitForFrames(page, 50);
+    const heap = async () => {
+      const session = await page.createCDPSession();
+      await session.send('HeapProfiler.collectGarbage');
+      return (await page.metrics()).JSHeapUsedSize;
+    };
+    const first = await heap();
+    const begin = await frames(page);
+    await waitForFrames(page, begin + 150);
+    const grown = ((await heap()) - first) / 1e6;
+    console.log(`the JavaScript heap grew by ${grown.toFixed(2)} MB over 150 frames`);
+    assert.ok(grown < 1, `${grown} MB`);
+  });
+});
+
+test('a phone screen shows everything without scrolling sideways', async () => {
+  await withPage(async ({ page }) => {
+    await page.setViewport({ width: 360, height: 740, isMobile: true, hasTouch: true });
+    const width = await page.evaluate(() => document.documentElement.scrollWidth);
+    assert.ok(width <= 360, `${width} pixels`);
+    for (const id of ['camera', 'report', 'overlay']) {
+      const box = await (await page.$(`#${id}`)).boundingBox();
+      assert.ok(box.height >= 36 && box.x + box.width <= 360, id);
+    }
+  });
+});

@@ -1,0 +1,171 @@
+// The page: images from a camera or a file go through dense pose, and what it finds is drawn over them.
+import { DensePose } from 'maquette';
+import { drawOverlay } from './overlay.js';
+import { Measurements } from './measurements.js';
+
+const element = (id) => document.getElementById(id);
+const canvas = element('view');
+const context = canvas.getContext('2d');
+const video = element('video');
+const started = performance.now();
+
+let densepose = null;
+let measurements = new Measurements();
+let run = 0; // of the source that is shown; a new one ends the loop of the one before
+let photo = null; // the last photo, shown again when a setting changes
+
+function say(text) {
+  element('status').textContent = text;
+}
+
+async function load() {
+  densepose?.close();
+  densepose = null;
+  const begin = performance.now();
+  densepose = await DensePose.load({ keypoints: element('keypoints').checked, longSide: Number(element('size').value) });
+  measurements = new Measurements({ loadMs: performance.now() - begin });
+  for (const id of ['camera', 'file']) element(id).disabled = false;
+}
+
+// Loads again after a failure or a change of settings, and goes on with what was shown.
+async function reload() {
+  try {
+    await load();
+    if (photo !== null) await showPhoto(photo);
+  } catch (error) {
+    say(error.message);
+  }
+}
+
+function show(image, result) {
+  if (canvas.width !== result.width || canvas.height !== result.height) {
+    canvas.width = result.width;
+    canvas.height = result.height;
+  }
+  context.drawImage(image, 0, 0);
+  drawOverlay(context, result, { kind: element('overlay').value, showsBoxes: element('ids').checked });
+  document.body.dataset.people = result.people.length;
+  document.body.dataset.frames = measurements.count;
+  if (measurements.count === 1) measurements.firstOverlayMs = performance.now() - started;
+  element('times').textContent = measurements.line(result);
+}
+
+async function process(image, options) {
+  const begin = performance.now();
+  const result = await densepose.run(image, options);
+  measurements.add(performance.now() - begin, result);
+  return result;
+}
+
+async function showPhoto(image) {
+  photo = image;
+  show(image, await process(image, { stream: false }));
+  say('');
+}
+
+// Frames of the video, the newest one each time, until another source is shown.
+async function showVideo() {
+  const mine = ++run;
+  photo = null;
+  let isFirst = true;
+  while (mine === run) {
+    await new Promise((resolve) => video.requestVideoFrameCallback(resolve));
+    if (mine !== run) return;
+    const frame = await createImageBitmap(video);
+    try {
+      const result = await process(frame, { timeMs: performance.now(), stream: !isFirst });
+      isFirst = false;
+      if (mine === run) show(frame, result);
+      say('');
+    } catch (error) {
+      say(error.message);
+      await reload();
+      isFirst = true;
+    } finally {
+      frame.close();
+    }
+  }
+}
+
+function stopVideo() {
+  ++run;
+  for (const track of video.srcObject?.getTracks() ?? []) track.stop();
+  video.srcObject = null;
+  if (video.src !== '') URL.revokeObjectURL(video.src);
+  video.removeAttribute('src');
+  element('camera').textContent = 'Start camera';
+}
+
+async function startCamera() {
+  say('Waiting for the camera …');
+  let stream;
+  try {
+    stream = await navigator.mediaDevices.getUserMedia({ video: { width: 640, height: 480, facingMode: 'user' } });
+  } catch (error) {
+    const isDenied = error.name === 'NotAllowedError';
+    say(isDenied ? 'The browser was not allowed to use the camera. Allow it, or drop a photo or clip.' : `There is no camera (${error.message}).`);
+    return;
+  }
+  video.srcObject = stream;
+  await video.play();
+  element('camera').textContent = 'Stop camera';
+  await showVideo();
+}
+
+async function open(file) {
+  stopVideo();
+  try {
+    if (file.type.startsWith('video/')) {
+      video.src = URL.createObjectURL(file);
+      video.loop = true;
+      await video.play();
+      await showVideo();
+    } else {
+      await showPhoto(await createImageBitmap(file));
+    }
+  } catch {
+    say(`${file.name} is no image or clip that this browser reads. Try a JPEG, PNG, WebP, MP4 or WebM.`);
+  }
+}
+
+element('camera').addEventListener('click', () => {
+  if (video.srcObject === null) {
+    stopVideo();
+    startCamera().catch((error) => say(error.message));
+  } else {
+    stopVideo();
+  }
+});
+element('file').addEventListener('change', ({ target }) => {
+  if (target.files.length > 0) open(target.files[0]);
+  target.value = '';
+});
+for (const id of ['keypoints', 'size']) element(id).addEventListener('change', reload);
+for (const id of ['overlay', 'ids']) element(id).addEventListener('change', () => photo !== null && showPhoto(photo));
+element('report').addEventListener('click', async () => {
+  const text = JSON.stringify(measurements.report(), null, 2);
+  document.body.dataset.report = text;
+  try {
+    await navigator.clipboard.writeText(text);
+    say('The report is in the clipboard.');
+  } catch (error) {
+    say(`The report cannot be copied (${error.message}).`);
+  }
+});
+
+const stage = element('stage');
+document.addEventListener('dragover', (event) => {
+  event.preventDefault();
+  stage.classList.add('dropping');
+});
+document.addEventListener('dragleave', () => stage.classList.remove('dropping'));
+document.addEventListener('drop', (event) => {
+  event.preventDefault();
+  stage.classList.remove('dropping');
+  if (event.dataTransfer.files.length > 0) open(event.dataTransfer.files[0]);
+});
+
+load().then(
+  () => say('Start the camera, or drop a photo or clip here.'),
+  (error) => say(error.message),
+);

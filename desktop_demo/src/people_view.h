@@ -48,7 +48,7 @@ class PeopleView final : public LiveView {
   float yaw_ = 0.5f, pitch_ = 0.15f;  // of the body
   Rect mesh_rect_;                    // empty where no body is drawn
   maquette::TripleBuffer<maquette::MappedFrame> frames_;
-  // Of the pipeline's thread:
+  // The pipeline's thread alone uses these.
   std::vector<uint8_t> seen_;
   maquette::GrowingTexture texture_;
   std::string texture_source_;  // its URI

@@ -77,7 +77,7 @@ TEST_F(MappedFrame, HasTheColoursOfThePersonWhoIsFollowed) {
   ASSERT_NE(frame.texture, nullptr);
   const std::shared_ptr<const maquette::RgbaImage> first = frame.texture;
   EXPECT_EQ(first->width_px * 6, first->height_px * 4);
-  // Of the largest person, as a texture alone has them.
+  // These are the colours of the largest person.
   maquette::PipelineResult again = mapped();
   const maquette::DensePoseResult densepose = maquette::densepose_of(again);
   const std::vector<maq_densepose_person> people = densepose.people();

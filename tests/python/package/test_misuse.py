@@ -74,7 +74,7 @@ def parameters(function: str) -> list[tuple[str, str]]:
 
 
 def dense_cloud() -> maquette.DenseCloud:
-    """Of a wall with noise, seen from three places."""
+    """Returns the cloud of a wall with noise, from three photos."""
     pattern = np.kron(np.random.default_rng(0).integers(30, 220, (24, 48)), np.ones((3, 3))).astype(np.uint8)
     photos = [pattern[:, 20 - shift : 120 - shift] for shift in (0, 10, -10)]
     intrinsics = maquette.Intrinsics.centred(100, 72, fov_deg=60)

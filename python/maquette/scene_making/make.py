@@ -117,8 +117,8 @@ class _Job:
     # -- input -------------------------------------------------------------------------------------------------
 
     def _check_input(self) -> dict[str, Any]:
-        """Returns the key of the work folder, with sizes and times of the files. Raises MaquetteError where the source is
-        neither a film nor a folder of photos."""
+        """Returns the key of the work folder, with sizes and times of the files. Raises MaquetteError for anything
+        but a film and a folder of photos."""
         if not self.source.exists():
             raise MaquetteError(f"{self.source} does not exist; check the path.", "MAQ_ERROR_NOT_FOUND")
         if self.source.is_dir():

@@ -109,7 +109,7 @@ class Matches:
             for image_id, file in files.items():
                 self.keypoints[number[file]] = opened.num_keypoints_for_image(image_id)
             self.inliers: dict[tuple[int, int], int] = {}
-            # Of pairs that show a plane, or anything from one place: number of the first photo, and x' = H x in pixels.
+            # The first photo and H, x' = H x in pixels, of pairs that show a plane, or anything from one place.
             self.homographies: list[tuple[int, np.ndarray]] = []
             panoramic = pycolmap.TwoViewGeometryConfiguration.PANORAMIC
             either = pycolmap.TwoViewGeometryConfiguration.PLANAR_OR_PANORAMIC

@@ -129,7 +129,7 @@ test-wheel:  ## the wheels of `make wheel` in bare Debian 11, 12 and 13, beside 
 	@$(PYTHON) -m tests.wheel
 
 .PHONY: bench-data
-bench-data: packages-test  ## data that `make bench` measures on: photographs, rendered people, places, solids (half an hour, once)
+bench-data: build packages-test  ## data that `make bench` measures on: photographs, rendered people, places, solids (half an hour, once)
 	@scripts/make-venv.sh train,teachers,solids,captures,clips
 	@.venv/bin/python -m benchmarks.data
 

@@ -28,7 +28,7 @@ SETTINGS = {
     "PredictorSettings": ("maq_predictor_config", ("method", "shared_with")),
     "NoveltySettings": ("maq_novelty_config", ("method", "shared_with")),
     "ConcealerSettings": ("maq_concealer_config", ("max_gap_ms", "method")),
-    "SceneBuildSettings": ("maq_scene_build_config", ()),
+    "SceneBuildSettings": ("maq_scene_build_config", ("points",)),
     "DenseCloudSettings": ("maq_dense_cloud_config", ()),
     "SceneRendererSettings": ("maq_scene_renderer_config", ()),
     "HeadBuilderSettings": ("maq_head_builder_config", ("texture",)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -113,17 +113,21 @@ class Scene(NativeObject):
     def build(
         capture: Capture | str | os.PathLike[str],
         progress: Progress | None = None,
+        points_from: Literal["default", "cloud", "depth"] = "default",
         **settings: Unpack[SceneBuildSettings],
     ) -> Scene:
         """Builds a scene. `SceneBuilder` builds one photo by photo.
 
+        points_from: "cloud": the capture's points; "depth": points computed from the photos, as `DenseCloud` does;
+        "default": "depth" if the capture has only the sparse points of COLMAP or nerfstudio.
         progress: called with the fraction done and the stage, a sentence; returns False to cancel. settings: fields of
         maq_scene_build_config by their names: long_side_px, max_views, max_points, threads, bundle_path, ... Raises
         MaquetteError, and the errors of `progress`."""
         n = native()
         capture = capture if isinstance(capture, Capture) else Capture(capture)
         callback = ProgressCallback(progress)
-        config = n.config("maq_scene_build_config", {**settings, "progress_callback": callback.pointer})
+        given = {**settings, "points": points_from, "progress_callback": callback.pointer}
+        config = n.config("maq_scene_build_config", given)
         build = ("maq_scene", n.context, config, capture.handle)
         return Scene(callback.run(lambda: n.create(*build, function="maq_scene_build")))
 

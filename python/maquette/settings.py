@@ -233,9 +233,6 @@ class SceneBuildSettings(ModelSettings, total=False):
     use_held_out: int
     """1: also use photos that the capture holds out for comparison; 0: do not."""
 
-    points: Literal["default", "cloud", "depth"]
-    """With "depth", max_points 0 means 1.5 million."""
-
 
 class DenseCloudSettings(TypedDict, total=False):
     """Fields of maq_dense_cloud_config."""

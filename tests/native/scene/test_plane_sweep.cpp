@@ -131,7 +131,7 @@ TEST(PlaneSweep, TheResultIsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(PlaneSweep, BlackAndOverexposedPhotosHaveNoDepth) {
-  for (const uint8_t level : {0, 255}) {
+  for (const uint8_t level : {uint8_t(0), uint8_t(255)}) {
     std::vector<TracedView> views = views_from(textured_scene::plane({0, 0, 1}, 2), 0.2);
     for (TracedView& view : views) std::fill(view.photo.grey.begin(), view.photo.grey.end(), level);
     EXPECT_EQ(known(depth_of_first(views, 1, 3)), 0u) << int(level);

@@ -4,6 +4,8 @@ import re
 from pathlib import Path
 from types import SimpleNamespace
 
+import maquette
+import numpy as np
 import pytest
 from maquette.declarations import declarations
 from maquette.native import native
@@ -26,8 +28,8 @@ MAY_BE_NULL = {"config", "user_data", "release_callback", "preview", "seen_point
                "maq_densepose_result_find_pixel distance", "maq_dense_cloud_get_points rgb"}  # fmt: skip
 # Arguments that are looked at after something that the objects of this test lack: cameras, controls, depth, room.
 LATER = {"maq_camera_list_get_camera info", "maq_camera_list_get_mode mode", "maq_source_get_control info",
-         "maq_capture_get_drop drop", "maq_capture_load_depth camera", "maq_frame_get_depth desc",
-         "maq_pipeline_result_get_novelty score", "maq_densepose_get_surface surface",
+         "maq_capture_get_drop drop", "maq_capture_load_depth camera", "maq_dense_cloud_create photos",
+         "maq_frame_get_depth desc", "maq_pipeline_result_get_novelty score", "maq_densepose_get_surface surface",
          "maq_densepose_model_get_surface surface", "maq_densepose_result_draw frame",
          "maq_densepose_result_draw drawing", "maq_densepose_result_draw rgba"}  # fmt: skip
 
@@ -49,7 +51,9 @@ OUT_OF_RANGE = {
     "maq_novelty_create": {"method": (2,), "event_ratio": (1, 0.5, -4, 1e7, NAN, float("inf"))},
     "maq_scene_build": {
         "long_side_px": (-2, 16385), "coefficient_bits": (9,), "min_variation": (-0.5, NAN),
-        "visibility_scale visibility scale": (1.01, NAN), "near_depth nearest point": (-1, NAN), "use_held_out": (2,)},
+        "visibility_scale visibility scale": (1.01, NAN), "near_depth nearest point": (-1, NAN), "use_held_out": (2,),
+        "points": (3, -1)},
+    "maq_dense_cloud_create": {"threads": (65, -1)},
     "maq_scene_renderer_create": {"image_pool_size": (65,), "near_depth": (-1, NAN), "use_background": (2,)},
     "maq_pipeline_create": {"result_pool_size": (65,), "nice": (20,)},
     "maq_head_mesh_create": {"cell_m": (-1, 1e-5, 1, NAN), "topology": (2,)},
@@ -67,6 +71,17 @@ def parameters(function: str) -> list[tuple[str, str]]:
         for match in found
         if match
     ]
+
+
+def dense_cloud() -> maquette.DenseCloud:
+    """Of a wall with noise, seen from three places."""
+    pattern = np.kron(np.random.default_rng(0).integers(30, 220, (24, 48)), np.ones((3, 3))).astype(np.uint8)
+    photos = [pattern[:, 20 - shift : 120 - shift] for shift in (0, 10, -10)]
+    intrinsics = maquette.Intrinsics.centred(100, 72, fov_deg=60)
+    step = 10 * 2 / intrinsics.fx_px
+    cameras = [maquette.PinholeCamera(intrinsics, np.eye(3), np.array([-k * step, 0, 0])) for k in (0, 1, -1)]
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, 8), np.linspace(-0.5, 0.5, 8))
+    return maquette.DenseCloud(photos, cameras, np.stack([x.ravel(), y.ravel(), 2 + 0.1 * x.ravel()], 1))
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +133,8 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     xyz = n.ffi.new("float[3]")
     cloud.point_count, cloud.xyz, cloud.up[2] = 1, xyz, 1
     create("maq_scene_builder", n.context, building, cloud)
+    made["maq_dense_cloud"] = (dense := dense_cloud()).handle
+    made["kept"] = dense
     renderer = create("maq_scene_renderer", n.context, model("maq_scene_renderer_config", DATA / "tiny_scene/bundle"),
                       scene)  # fmt: skip
     camera = n.sized("maq_capture_view")

@@ -69,12 +69,12 @@ maq_status maq_dense_cloud_create(maq_context* context, const maq_dense_cloud_co
     require_argument(photos, "photos");
     require_argument(sparse, "sparse");
     require_argument(cloud, "cloud");
-    require_range("photo_count", photo_count, 1u, 100'000u);
     const maq_dense_cloud_config config = read_config(given, "config", default_dense_cloud_config());
     require_range("config.threads", config.threads, 0, kMaxThreads);
-    for (uint32_t i = 0; i < photo_count; ++i) check_posed_photo(photos[i], i);
     const PointCloud points = points_of_app("sparse", *sparse);
     check_finite(points);
+    require_range("photo_count", photo_count, 1u, 100'000u);
+    for (uint32_t i = 0; i < photo_count; ++i) check_posed_photo(photos[i], i);
     DenseCloudInput input;
     input.photos = photo_count;
     input.points = points.positions();

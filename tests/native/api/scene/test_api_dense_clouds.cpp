@@ -1,8 +1,11 @@
 // Dense clouds through the C API: of photos of a wall, and of captures with a sparse cloud.
 #include <gtest/gtest.h>
 
+#include <climits>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <memory>
 
 #include "support/samples/api_tiny_scene.h"
 

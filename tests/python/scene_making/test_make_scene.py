@@ -237,6 +237,21 @@ def test_a_full_disk_is_said_before_and_during_the_work(tmp_path, monkeypatch):
         maquette.make_scene(film, tmp_path / "a.maqs")
 
 
+def test_an_error_of_colmap_is_a_sentence_and_on_a_full_disk_says_so(room, tmp_path, monkeypatch):
+    def fails(*_):
+        raise RuntimeError("database disk image is malformed")
+
+    monkeypatch.setattr(make, "require_pycolmap", lambda: None)
+    monkeypatch.setattr(make, "pose", fails)
+    with pytest.raises(maquette.MaquetteError, match="COLMAP ended with an error: database disk image"):
+        maquette.make_scene(room, tmp_path / "a.maqs")
+    usage = shutil.disk_usage(tmp_path)
+    free = iter((10**9, 0))
+    monkeypatch.setattr(make.shutil, "disk_usage", lambda _: usage._replace(free=next(free)))
+    with pytest.raises(maquette.MaquetteError, match=r"disk of .* is full"):
+        maquette.make_scene(room, tmp_path / "a.maqs")
+
+
 def test_ctrl_c_ends_the_command_and_says_how_to_go_on(tmp_path):
     if not __import__("importlib.util").util.find_spec("pycolmap"):
         pytest.skip("pycolmap is not installed: maquette[scenes]")

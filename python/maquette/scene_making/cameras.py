@@ -37,7 +37,7 @@ class Posed:
 def require_pycolmap() -> None:
     """Raises MaquetteError if pycolmap is not installed."""
     try:
-        import pycolmap
+        import pycolmap  # type: ignore[import-not-found,unused-ignore]
     except ImportError as error:
         raise MaquetteError(
             "A film or photos need pycolmap, which finds the cameras (Python 3.10 or newer, x86-64): pip install "

@@ -29,6 +29,7 @@ Progress = Callable[[float, str], "bool | None"]
 MAX_PHOTOS = 50
 _VERSION = 1  # of the results in work folders
 _MIN_FREE_BYTES = 400_000_000
+_FULL_BYTES = 1_000_000
 # Share of each stage in the time, for the progress.
 _STAGES = {"photos": 0.1, "cameras": 0.3, "depth": 0.45, "scene": 0.1, "preview": 0.05}
 _SPARSE = "sparse.npy"
@@ -62,6 +63,13 @@ def make_scene(
     job = _Job(source, out, progress, max_photos, threads or os.cpu_count() or 1)
     try:
         return job.run()
+    except MaquetteError:
+        raise
+    except RuntimeError as error:  # of pycolmap
+        if shutil.disk_usage(out.parent).free < _FULL_BYTES:
+            raise MaquetteError(job.disk_is_full(), "MAQ_ERROR_UNWRITABLE") from None
+        problem = f"COLMAP ended with an error: {error}. Run the same again, or delete {job.work_path} before."
+        raise MaquetteError(problem, "MAQ_ERROR_INTERNAL") from error
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
@@ -117,8 +125,8 @@ class _Job:
     # -- input -------------------------------------------------------------------------------------------------
 
     def _check_input(self) -> dict[str, Any]:
-        """Returns the key of the work folder, with sizes and times of the files. Raises MaquetteError where the source is
-        neither a film nor a folder of photos."""
+        """Returns the key of the work folder, with sizes and times of the files. Raises MaquetteError for anything
+        but a film and a folder of photos."""
         if not self.source.exists():
             raise MaquetteError(f"{self.source} does not exist; check the path.", "MAQ_ERROR_NOT_FOUND")
         if self.source.is_dir():

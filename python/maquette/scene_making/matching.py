@@ -33,7 +33,7 @@ def extract_features(
     database: Path, folder: Path, photos: Sequence[Photo], threads: int, progress: Callable[[float], None]
 ) -> None:
     """Raises OSError where the disk is full."""
-    import pycolmap
+    import pycolmap  # type: ignore[import-not-found,unused-ignore]
 
     options = pycolmap.FeatureExtractionOptions(num_threads=threads, use_gpu=False, max_image_size=_LONG_SIDE_PX)
     options.sift.max_num_features = _FEATURES
@@ -67,7 +67,9 @@ def _camera_of(database: Path, photo: Photo) -> int:
 
     opened = pycolmap.Database.open(database)
     try:
-        camera_id = opened.read_image_with_name(photo.file).camera_id
+        image = opened.read_image_with_name(photo.file)
+        assert image is not None  # its features have been found
+        camera_id = image.camera_id
         camera = opened.read_camera(camera_id)
         if photo.focal_px > 0 and not camera.has_prior_focal_length:
             camera.focal_length = photo.focal_px
@@ -109,7 +111,7 @@ class Matches:
             for image_id, file in files.items():
                 self.keypoints[number[file]] = opened.num_keypoints_for_image(image_id)
             self.inliers: dict[tuple[int, int], int] = {}
-            # Of pairs that show a plane, or anything from one place: number of the first photo, and x' = H x in pixels.
+            # The first photo and H, x' = H x in pixels, of pairs that show a plane, or anything from one place.
             self.homographies: list[tuple[int, np.ndarray]] = []
             panoramic = pycolmap.TwoViewGeometryConfiguration.PANORAMIC
             either = pycolmap.TwoViewGeometryConfiguration.PLANAR_OR_PANORAMIC

@@ -41,7 +41,8 @@ def write_preview(
     shown = [k for k, view in enumerate(views) if view.held_out]
     if not shown:
         shown = sorted({round((k + 0.5) * len(views) / _SHOWN - 0.5) for k in range(_SHOWN)})
-    compared, rows = [], []
+    compared: list[Compared] = []
+    rows: list[np.ndarray] = []
     with SceneRenderer(scene, threads=threads) as renderer:
         for k in shown:
             progress(len(rows) / len(shown))

@@ -57,7 +57,8 @@ class SceneReport:
         ]
         if held_out:
             each = ", ".join(f"{view.psnr_db:.1f}" for view in held_out)
-            lines.append(f"  quality   {self.psnr_db:.1f} dB PSNR on {len(held_out)} held-out photos ({each})")
+            photos = "photo" if len(held_out) == 1 else "photos"
+            lines.append(f"  quality   {self.psnr_db:.1f} dB PSNR on {len(held_out)} held-out {photos} ({each})")
         else:
             lines.append("  quality   not measured: with fewer than 6 photos none is held out")
         stages = ", ".join(f"{name} {value:.1f}" for name, value in self.seconds.items())

@@ -152,6 +152,20 @@ def test_a_photo_of_another_place_is_left_out_by_name(room, sparse_cloud, tmp_pa
 
 
 @needs_pycolmap
+def test_upright_and_level_photos_of_one_camera_get_the_same_focal_length(room, sparse_cloud, tmp_path):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for k, file in enumerate(sorted(room.iterdir())):
+        image = np.asarray(maquette.Frame.open(file))
+        maquette.Frame(np.ascontiguousarray(image[:, 60:260] if k % 2 else image)).save(folder / file.name)
+    report = maquette.make_scene(folder, tmp_path / "room.maqs", threads=1)
+    assert report.posed == 7
+    shapes = [view.camera.intrinsics for view in maquette.Capture(report.capture).views]
+    assert [shape.width_px for shape in shapes] == [320, 200] * 3 + [320]
+    assert np.ptp([shape.fx_px for shape in shapes]) < 0.03 * shapes[0].fx_px
+
+
+@needs_pycolmap
 def test_photos_that_share_nothing_end_with_advice(tmp_path):
     folder = tmp_path / "photos"
     folder.mkdir()
@@ -221,6 +235,21 @@ def test_a_full_disk_is_said_before_and_during_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr(WorkFolder, "finish", full)
     with pytest.raises(maquette.MaquetteError, match=r"disk of .* is full"):
         maquette.make_scene(film, tmp_path / "a.maqs")
+
+
+def test_an_error_of_colmap_is_a_sentence_and_on_a_full_disk_says_so(room, tmp_path, monkeypatch):
+    def fails(*_):
+        raise RuntimeError("database disk image is malformed")
+
+    monkeypatch.setattr(make, "require_pycolmap", lambda: None)
+    monkeypatch.setattr(make, "pose", fails)
+    with pytest.raises(maquette.MaquetteError, match="COLMAP ended with an error: database disk image"):
+        maquette.make_scene(room, tmp_path / "a.maqs")
+    usage = shutil.disk_usage(tmp_path)
+    free = iter((10**9, 0))
+    monkeypatch.setattr(make.shutil, "disk_usage", lambda _: usage._replace(free=next(free)))
+    with pytest.raises(maquette.MaquetteError, match=r"disk of .* is full"):
+        maquette.make_scene(room, tmp_path / "a.maqs")
 
 
 def test_ctrl_c_ends_the_command_and_says_how_to_go_on(tmp_path):

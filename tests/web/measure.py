@@ -33,7 +33,8 @@ def main() -> None:
 
     command = ["node", str(ROOT / "tests/web/measure.js"), str(raw), "640", "480", str(options.frames)]
     node = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert node.stdin and node.stdout
+    assert node.stdin is not None
+    assert node.stdout is not None
     assert node.stdout.readline() == "ready\n"
     native, web = [], []
     with maquette.DensePose(threads=1) as densepose:

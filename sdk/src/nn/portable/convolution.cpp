@@ -222,8 +222,6 @@ FloatConvolution::FloatConvolution(const Windows& windows, int inputs, int outpu
   }
 }
 
-void FloatConvolution::set_bias(const std::vector<float>& bias) { bias_ = padded(bias, outputs_); }
-
 Extents FloatConvolution::output_extents(const std::vector<const Tensor*>& inputs) const {
   return convolved(windows_, *inputs[0], inputs_, outputs_);
 }

@@ -109,8 +109,6 @@ class FloatConvolution : public FloatLayer {
   FloatConvolution(const Windows& windows, int inputs, int outputs, const std::vector<float>& weights,
                    const std::vector<float>& bias);
 
-  void set_bias(const std::vector<float>& bias);
-
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
   void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
   void run_like_onnxruntime(const Tensor& input, Tensor& output) const override;

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "nn/portable/convolution.h"
 #include "nn/portable/float_stage.h"
+#include "nn/portable/matrix_product.h"
 #include "nn/portable/value_layers.h"
 
 namespace maq {
@@ -288,7 +289,6 @@ class Builder {
     made.tensor = add_step(std::move(layer), {float_tensor(image)}, true);
   }
 
-  // Products with a matrix of floats are convolutions of single pixels.
   void add_matrix_product(const OnnxNode& node, Value& made) {
     const Value& image = input(node, 0);
     const OnnxTensor& weights = constant(node, 1);
@@ -306,7 +306,7 @@ class Builder {
       }
     }
     const std::vector<float> bias = node.inputs.size() > 2 ? numbers<float>(constant(node, 2)) : std::vector<float>();
-    auto layer = std::make_unique<FloatConvolution>(Windows{}, int(inputs), int(outputs), values, bias);
+    auto layer = std::make_unique<MatrixProduct>(inputs, outputs, values, bias);
     made.is_float = true;
     if (bias.empty()) made.add_bias = [layer = layer.get()](const std::vector<float>& of) { layer->set_bias(of); };
     made.tensor = add_step(std::move(layer), {float_tensor(image)}, true);

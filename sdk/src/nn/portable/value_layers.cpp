@@ -1,6 +1,7 @@
 #include "nn/portable/value_layers.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "nn/portable/simd.h"
@@ -131,22 +132,19 @@ Extents QuantizedSum::output_extents(const std::vector<const Tensor*>& inputs) c
 
 void QuantizedSum::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
   const Tensor &a = *inputs[0], &b = *inputs[1];
-  // The order of operations is that of ONNX Runtime, with all zero points in one term.
+  // ONNX Runtime has all zero points in one term, and rounds once for a product and a sum.
   const float ratio_of_a = a_.scale / to_.scale, ratio_of_b = b_.scale / to_.scale;
   const float fixed = float(to_.zero_point) - (ratio_of_a * float(a_.zero_point) + ratio_of_b * float(b_.zero_point));
-  const Floats zero_of_a = repeat(float(a_.zero_point)), zero_of_b = repeat(float(b_.zero_point));
-  const Floats scale_of_a = repeat(ratio_of_a), scale_of_b = repeat(ratio_of_b), offset = repeat(fixed);
-  const Floats zero_of_sum = repeat(float(-to_.zero_point));
-  const auto sum = [&](const int16_t* of_a, const int16_t* of_b, int16_t* to, size_t all) {
-    each_eight(all, [&](size_t at, size_t count) {
-      const Floats8 sums = apply(floats_of(load_some(of_a + at, count)), floats_of(load_some(of_b + at, count)),
-                                 [&](Floats x, Floats y) {
-                                   const Floats second = add(multiply(add(y, zero_of_b), scale_of_b), offset);
-                                   // whole numbers from 0 to 255 are rounded alike with and without the zero point
-                                   return add(add(multiply(add(x, zero_of_a), scale_of_a), second), zero_of_sum);
-                                 });
-      store_some(to + at, rounded(sums, to_), count);
-    });
+  float of_b[256];  // for each number of b
+  for (int number = 0; number < 256; ++number)
+    of_b[number] = float(double(number) * double(ratio_of_b) + double(fixed));
+  const double of_a = double(ratio_of_a);
+  const int zero_of_a = a_.zero_point, zero_of_b = b_.zero_point, zero = to_.zero_point;
+  const auto sum = [&](const int16_t* from_a, const int16_t* from_b, int16_t* to, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+      const float value = float(double(from_a[i] + zero_of_a) * of_a + double(of_b[from_b[i] + zero_of_b]));
+      to[i] = int16_t(int(std::nearbyint(std::clamp(value, 0.0f, 255.0f))) - zero);
+    }
   };
   if (a.extents == b.extents) return sum(a.quantized, b.quantized, output.quantized, count_of(a.extents));
   const size_t channels = size_t(a.channels()), pixels = a.pixels() / size_t(a.extents[0]);

@@ -1,0 +1,64 @@
+#include "nn/portable/matrix_product.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/error.h"
+
+namespace maq {
+namespace {
+
+constexpr size_t kWidth = 8;     // outputs of a step
+constexpr size_t kSummed = 256;  // inputs whose products are summed before the sum is added to the result
+
+}  // namespace
+
+MatrixProduct::MatrixProduct(size_t inputs, size_t outputs, const std::vector<float>& weights,
+                             const std::vector<float>& bias)
+    : inputs_(inputs), outputs_(outputs) {
+  const size_t blocks = (outputs + kWidth - 1) / kWidth;
+  weights_.resize(blocks * kWidth * inputs);
+  for (size_t output = 0; output < outputs; ++output) {
+    for (size_t input = 0; input < inputs; ++input) {
+      weights_[(output / kWidth * inputs + input) * kWidth + output % kWidth] = weights[output * inputs + input];
+    }
+  }
+  set_bias(bias);
+}
+
+void MatrixProduct::set_bias(const std::vector<float>& bias) {
+  bias_ = bias;
+  bias_.resize((outputs_ + kWidth - 1) / kWidth * kWidth);
+}
+
+Extents MatrixProduct::output_extents(const std::vector<const Tensor*>& inputs) const {
+  Extents extents = inputs[0]->extents;
+  if (size_t(extents[3]) != inputs_) {
+    throw Error(MAQ_ERROR_INFERENCE, "A product of ", inputs_, " channels got ", extents[3], ".");
+  }
+  extents[3] = int(outputs_);
+  return extents;
+}
+
+void MatrixProduct::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+  const float* from = inputs[0]->floats;
+  float* to = output.floats;
+  for (size_t pixel = 0; pixel < output.pixels(); ++pixel, from += inputs_, to += outputs_) {
+    for (size_t first = 0; first < outputs_; first += kWidth) {
+      std::array<float, kWidth> result;
+      std::copy_n(bias_.data() + first, kWidth, result.begin());
+      const float* weights = weights_.data() + first * inputs_;
+      for (size_t begin = 0; begin < inputs_; begin += kSummed) {
+        std::array<float, kWidth> sums{};
+        for (size_t input = begin; input < std::min(begin + kSummed, inputs_); ++input, weights += kWidth) {
+          const double value = double(from[input]);
+          for (size_t i = 0; i < kWidth; ++i) sums[i] = float(value * double(weights[i]) + double(sums[i]));
+        }
+        for (size_t i = 0; i < kWidth; ++i) result[i] = sums[i] + result[i];
+      }
+      std::copy_n(result.begin(), std::min(kWidth, outputs_ - first), to + first);
+    }
+  }
+}
+
+}  // namespace maq

@@ -19,7 +19,7 @@ maq::PointCloud wall() {
   return cloud;
 }
 
-TEST(ViewSelection, TheBestNeighbourSeesTheSameFromSomeTenDegreesAside) {
+TEST(ViewSelection, TheBestNeighbourSeesTheSameFromSomeDegreesAside) {
   std::vector<PinholeCamera> cameras;
   for (const double x : {0.0, 0.05, 0.6, 2.5}) cameras.push_back(camera_at({x, 0, 0}));
   cameras.push_back(turned(camera_at({0.6, 0, 0}), 3.14159265));  // looks away

@@ -7,8 +7,9 @@ namespace maq {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-constexpr double kBestAngle = 10, kAngleWidth = 8;  // degrees between two cameras at a point
+constexpr double kBestAngle = 6, kAngleWidth = 6;  // degrees between two cameras at a point
 constexpr double kMinAngle = 0.1;                   // below it depth cannot be measured
+constexpr double kShareOfAll = 0.05;                // of a photo's goodness for points that have two good ones already
 constexpr size_t kMinShared = 12;
 // Points of a larger cloud are taken at even steps; more would not change the order of neighbours.
 constexpr size_t kMinSample = 512, kMaxSample = 4096;
@@ -42,10 +43,17 @@ double value_at(std::vector<double>& values, double fraction) {
   return *at;
 }
 
-// 0 for cameras that are no neighbours.
-double neighbour_score(const PinholeCamera& a, const PinholeCamera& b, const std::vector<Seen>& of_a,
-                       const std::vector<Seen>& of_b, const std::vector<std::array<double, 3>>& points) {
-  std::vector<double> cosines;
+// How well another photo measures the depth of each point that both see.
+struct Pair {
+  std::vector<float> goodness;  // 0 to 1; 0 for points that it does not see
+  double sum = 0;               // 0 for photos that are no neighbours
+};
+
+Pair compare_photos(const PinholeCamera& a, const PinholeCamera& b, const std::vector<Seen>& of_a,
+                    const std::vector<Seen>& of_b, const std::vector<std::array<double, 3>>& points) {
+  Pair pair;
+  pair.goodness.resize(of_a.size());
+  std::vector<double> angles;
   for (size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
     if (of_a[i].point != of_b[j].point) {
       ++(of_a[i].point < of_b[j].point ? i : j);
@@ -60,14 +68,43 @@ double neighbour_score(const PinholeCamera& a, const PinholeCamera& b, const std
       length_b += to_b * to_b;
     }
     const double cosine = dot / std::sqrt(length_a * length_b);
-    if (std::isfinite(cosine)) cosines.push_back(cosine);
+    if (std::isfinite(cosine)) {
+      const double angle = std::acos(std::min(std::max(cosine, -1.0), 1.0)) * kDegrees;
+      const double off = (angle - kBestAngle) / kAngleWidth;
+      angles.push_back(angle);
+      pair.goodness[i] = float(std::exp(-off * off));
+    }
     ++i, ++j;
   }
-  if (cosines.size() < kMinShared) return 0;
-  const double angle = std::acos(std::min(std::max(value_at(cosines, 0.5), -1.0), 1.0)) * kDegrees;
-  if (!(angle >= kMinAngle)) return 0;
-  const double off = (angle - kBestAngle) / kAngleWidth;
-  return double(cosines.size()) * std::exp(-off * off);
+  if (angles.size() < kMinShared || !(value_at(angles, 0.5) >= kMinAngle)) return pair;
+  for (const float goodness : pair.goodness) pair.sum += double(goodness);
+  return pair;
+}
+
+// Near things are seen at larger angles than far ones: photos are taken one after the other so that each point has two
+// good ones, as a depth counts that two photos agree with. Then come those that are best for all points.
+std::vector<uint32_t> chosen_neighbours(std::vector<Pair>& pairs, size_t points, size_t max_neighbours) {
+  std::vector<float> best(points), second(points);
+  std::vector<uint32_t> chosen;
+  while (chosen.size() < max_neighbours) {
+    size_t next = pairs.size();
+    double most = 0;
+    for (size_t k = 0; k < pairs.size(); ++k) {
+      if (!(pairs[k].sum > 0)) continue;
+      double gain = kShareOfAll * pairs[k].sum;
+      for (size_t i = 0; i < points; ++i) gain += double(std::max(pairs[k].goodness[i] - second[i], 0.0f));
+      if (gain > most) most = gain, next = k;
+    }
+    if (next == pairs.size()) break;
+    for (size_t i = 0; i < points; ++i) {
+      const float goodness = pairs[next].goodness[i];
+      second[i] = std::max(second[i], std::min(best[i], goodness));
+      best[i] = std::max(best[i], goodness);
+    }
+    pairs[next].sum = 0;
+    chosen.push_back(uint32_t(next));
+  }
+  return chosen;
 }
 
 }  // namespace
@@ -89,16 +126,11 @@ std::vector<ViewPlan> plan_views(const std::vector<PinholeCamera>& cameras, cons
   std::vector<ViewPlan> plans(views);
   for (size_t i = 0; i < views; ++i) {
     if (seen[i].size() < kMinShared) continue;
-    std::vector<double> scores(views);
+    std::vector<Pair> pairs(views);
     for (size_t j = 0; j < views; ++j) {
-      if (j != i) scores[j] = neighbour_score(cameras[i], cameras[j], seen[i], seen[j], points);
+      if (j != i) pairs[j] = compare_photos(cameras[i], cameras[j], seen[i], seen[j], points);
     }
-    while (plans[i].neighbours.size() < max_neighbours) {
-      const auto best = std::max_element(scores.begin(), scores.end());
-      if (!(*best > 0)) break;
-      plans[i].neighbours.push_back(uint32_t(best - scores.begin()));
-      *best = 0;
-    }
+    plans[i].neighbours = chosen_neighbours(pairs, seen[i].size(), max_neighbours);
     std::vector<double> depths;
     for (const Seen& point : seen[i]) depths.push_back(point.depth);
     plans[i].near = kNearMargin * value_at(depths, kNearFraction);

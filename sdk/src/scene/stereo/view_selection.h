@@ -17,7 +17,8 @@ struct ViewPlan {
   bool has_depth() const { return !neighbours.empty() && near > 1e-30 && far < 1e30; }
 };
 
-// Neighbours see most of the points that a photo sees, from some 10 degrees aside; at most `max_neighbours` each. A
+// Neighbours see the points that a photo sees from some 6 degrees aside, each point two of them if possible: near
+// points other ones than far points. At most `max_neighbours` each. A
 // photo that sees fewer than 12 points has none, and neither has one whose neighbours all stand where it stands.
 std::vector<ViewPlan> plan_views(const std::vector<PinholeCamera>& cameras, const PointPositions& points,
                                  size_t max_neighbours);

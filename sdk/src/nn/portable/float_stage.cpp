@@ -7,7 +7,8 @@
 namespace maq {
 namespace {
 
-// In steps of the quantization. The values of both ways of rounding differ by 0.00006 at most in the shipped network.
+// In steps of the quantization. The values of both ways of rounding differed by up to 0.00017 on photos, in the shipped
+// network.
 constexpr float kNearlyBetween = 0.0003f;
 
 }  // namespace

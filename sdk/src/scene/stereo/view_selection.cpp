@@ -8,8 +8,8 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kBestAngle = 6, kAngleWidth = 6;  // degrees between two cameras at a point
-constexpr double kMinAngle = 0.1;                   // below it depth cannot be measured
-constexpr double kShareOfAll = 0.05;                // of a photo's goodness for points that have two good ones already
+constexpr double kMinAngle = 0.1;                  // below it depth cannot be measured
+constexpr double kShareOfAll = 0.05;               // of a photo's goodness for points that have two good ones already
 constexpr size_t kMinShared = 12;
 // Points of a larger cloud are taken at even steps; more would not change the order of neighbours.
 constexpr size_t kMinSample = 512, kMaxSample = 4096;

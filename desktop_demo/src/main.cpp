@@ -98,8 +98,7 @@ int main(int argc, char** argv) try {
   cli.add_option("--view", view, "View at the start")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh, "Show the template body in the corner");
   cli.add_flag("--person-colours,!--no-person-colours", options.person_colours,
-               "The template body gets the colours of the person, more with each frame; otherwise visible parts get a "
-               "colour each");
+               "Show the body in the colours of the person, more with each frame; otherwise by visible part");
   cli.add_option("--texture", options.texture, "Outfit of the try-on view: a DensePose atlas (2:3), or any image")
       ->check(CLI::ExistingFile);
   cli.add_option("--capture", options.capture, "Folder of the photos that the scene file was made of")

@@ -3,9 +3,7 @@
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 #include <algorithm>
-#include <cstdio>
 #include <iterator>
-#include <maquette/densepose_mesh.hpp>
 #include <thread>
 #include <utility>
 
@@ -27,52 +25,30 @@ PeopleView::PeopleView(const maquette::Context& context, const Options& options,
       texture_(context),
       live_(
           context, options.model,
-          [this](maquette::PipelineResult mapped, double rate) { take(std::move(mapped), rate); }, Window::wake,
-          options.live) {
+          [this](maquette::PipelineResult mapped, double rate) {
+            texture_.set_source(live_.status().uri);
+            frames_.back().copy_from(std::move(mapped), rate, &seen_, wears_colours_ ? &texture_ : nullptr);
+            frames_.publish();
+            Window::wake();
+          },
+          Window::wake, options.live) {
   set_live(&live_);
   // Software OpenGL compiles a shader when it draws with it first: now, before the user waits.
   for (const View view : {View::kCamera, View::kParts}) painter_.draw_people(view, {0, 0, 8, 8});
-  painter_.draw_body({0, 0, 8, 8}, 0, 0, false);
-}
-
-void PeopleView::take(maquette::PipelineResult mapped, double rate) {
-  // Ids begin anew with each source.
-  std::string source = live_.status().uri;
-  if (source != texture_source_) texture_.begin_again();
-  texture_source_ = std::move(source);
-  frames_.back().copy_from(std::move(mapped), rate, &seen_, wears_colours_ ? &texture_ : nullptr);
-  frames_.publish();
-  Window::wake();
+  painter_.draw_body({0, 0, 8, 8}, 0, 0);
 }
 
 bool PeopleView::update() {
-  if (!has_surface_) {
-    if (const std::optional<maq_densepose_surface> surface = live_.surface()) {
-      const size_t count = size_t(24 * 3) * size_t(surface->nodes) * size_t(surface->nodes);
-      painter_.set_body(maquette::DensePoseMesh({surface->points_m, surface->points_m + count}, surface->nodes));
-      has_surface_ = true;
-    }
-  }
+  const std::optional<maquette::DensePoseMesh> body = has_surface_ ? std::nullopt : live_.body();
+  if (body) painter_.set_body(*body);
+  has_surface_ |= body.has_value();
   note_end();
   if (!frames_.take()) return false;
   painter_.set_frame(frame());
-  if (frame().texture != nullptr && frame().texture != shown_texture_) painter_.set_texture(*frame().texture);
-  shown_texture_ = frame().texture;
   const maq_densepose_stats& s = frame().stats;
   stages_.add({s.trunk_ms, s.proposals_ms, s.box_head_ms, s.dense_head_ms, s.crops_ms, s.decode_ms + s.keypoints_ms,
                s.preprocess_ms, float(frame().copying_ms), float(frame().waiting_ms)});
   return true;
-}
-
-std::optional<maquette::LiveHeadPhoto> PeopleView::head_photo() const {
-  if (frame().number == 0) return std::nullopt;
-  maquette::LiveHeadPhoto photo{frame().camera, {}};
-  const auto area = [](const std::array<float, 4>& box) { return (box[2] - box[0]) * (box[3] - box[1]); };
-  for (uint32_t i = 0; i < frame().people.size(); ++i) {
-    const auto box = frame().result->head_box_px(i);
-    if (box && (!photo.box_px || area(*box) > area(*photo.box_px))) photo.box_px = box;
-  }
-  return photo;
 }
 
 Action PeopleView::press(int key) {
@@ -98,7 +74,7 @@ void PeopleView::draw(const Rect& area) {
   if (!shows_mesh_) return;
   const int side = std::min(area.width, area.height) * 3 / 10;
   mesh_rect_ = {0, area.height - side, side, side};
-  painter_.draw_body(mesh_rect_, yaw_, pitch_, shown_texture_ != nullptr);
+  painter_.draw_body(mesh_rect_, yaw_, pitch_);
 }
 
 void PeopleView::draw_marks() const {
@@ -115,12 +91,11 @@ void PeopleView::draw_marks() const {
     const ImVec2 from = on_screen(person.box_px[0], person.box_px[1]);
     const ImVec2 to = on_screen(person.box_px[2], person.box_px[3]);
     list->AddRect(from, to, IM_COL32(255, 255, 255, 255), 0, 0, 2 * window_.scale());
-    char score[40];
-    std::snprintf(score, sizeof score, "#%lld %.2f", static_cast<long long>(person.id), double(person.score));
-    const ImVec2 size = ImGui::CalcTextSize(score);
+    const std::string label = maquette::label_of(person);
+    const ImVec2 size = ImGui::CalcTextSize(label.c_str());
     const float top = std::max(float(image_rect_.y), from.y - size.y - 4);
     list->AddRectFilled({from.x, top}, {from.x + size.x + 8, top + size.y + 4}, IM_COL32(255, 255, 255, 255));
-    list->AddText({from.x + 4, top + 2}, IM_COL32(24, 26, 40, 255), score);
+    list->AddText({from.x + 4, top + 2}, IM_COL32(24, 26, 40, 255), label.c_str());
   }
 }
 

@@ -6,9 +6,7 @@
 #include <app/mapped_frame.h>
 #include <app/triple_buffer.h>
 #include <atomic>
-#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "live_view.h"
@@ -20,7 +18,7 @@ class PeopleView final : public LiveView {
   bool is_trying_on() const { return view_ == View::kTryOn; }
 
   // The current image with the largest head; nothing before the first image.
-  std::optional<maquette::LiveHeadPhoto> head_photo() const;
+  std::optional<maquette::LiveHeadPhoto> head_photo() const { return maquette::head_photo_of(frame()); }
 
   bool update() override;
   Action press(int key) override;
@@ -34,8 +32,7 @@ class PeopleView final : public LiveView {
 
  private:
   const maquette::MappedFrame& frame() const { return frames_.front(); }
-  void take(maquette::PipelineResult mapped, double rate);  // on the pipeline's thread
-  void draw_marks() const;                                  // skeletons, and in their view boxes
+  void draw_marks() const;  // skeletons, and in their view boxes
   void draw_views();
   void draw_model_options();
 
@@ -43,15 +40,12 @@ class PeopleView final : public LiveView {
   float roll_rad_ = 0;
   View view_;
   bool shows_mesh_, has_surface_ = false;
-  std::atomic<bool> wears_colours_;  // the body in the corner, the person's
-  std::shared_ptr<const maquette::RgbaImage> shown_texture_;
+  std::atomic<bool> wears_colours_;   // the body in the corner, the person's
   float yaw_ = 0.5f, pitch_ = 0.15f;  // of the body
   Rect mesh_rect_;                    // empty where no body is drawn
   maquette::TripleBuffer<maquette::MappedFrame> frames_;
   // The pipeline's thread alone uses these.
   std::vector<uint8_t> seen_;
   maquette::GrowingTexture texture_;
-  std::string texture_source_;  // its URI
-
   maquette::LiveDensePose live_;  // last: its thread uses the others
 };

@@ -5,6 +5,7 @@
 #include <maquette/maquette.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "app/rgba_image.h"
 
@@ -19,7 +20,11 @@ class GrowingTexture {
   // has been away for 90 frames, it begins again with the largest one then.
   void add(const DensePoseResult& result, const Frame& frame);
 
-  void begin_again() { texture_.reset(); }
+  // Begins again if the frames now come from another source, where ids begin anew.
+  void set_source(const std::string& uri) {
+    if (uri != source_) texture_.reset();
+    source_ = uri;
+  }
 
   // The texture as maq_densepose_texture_draw describes it, of one of the last eight frames; null before there is one.
   const std::shared_ptr<const RgbaImage>& image() const { return image_; }
@@ -27,6 +32,7 @@ class GrowingTexture {
  private:
   const Context& context_;
   std::optional<DensePoseTexture> texture_;
+  std::string source_;
   int64_t person_ = 0;  // whose texture it is
   int frames_away_ = 0, frames_since_drawn_ = 0;
   std::shared_ptr<const RgbaImage> image_;

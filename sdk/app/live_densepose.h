@@ -9,6 +9,8 @@
 //   for (;;) { if (shown.take()) draw(shown.front()); write(live.status().problem); }
 #pragma once
 
+#include <maquette/densepose_mesh.hpp>
+#include <optional>
 #include <utility>
 
 #include "app/live_pipeline.h"
@@ -34,8 +36,13 @@ class LiveDensePose : public LivePipeline {
     roll_rad_ = roll_rad;
     model_.set_roll(roll_rad);
   }
-  // Returns nothing before a model is loaded that has one. The points are valid until set_model().
-  std::optional<maq_densepose_surface> surface() const { return model_.surface(); }
+  // The body at rest; nothing before a model is loaded that has one.
+  std::optional<DensePoseMesh> body() const {
+    const std::optional<maq_densepose_surface> surface = model_.surface();
+    if (!surface) return std::nullopt;
+    const size_t count = size_t(24 * 3) * size_t(surface->nodes) * size_t(surface->nodes);
+    return DensePoseMesh({surface->points_m, surface->points_m + count}, surface->nodes);
+  }
 
  private:
   LiveDensePose(const Context& context, DensePoseModel model, std::function<void(PipelineResult, double)> on_result,

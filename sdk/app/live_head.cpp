@@ -65,6 +65,17 @@ void compose(const Image& image, const RgbaImage& behind, RgbaImage& to) {
 
 }  // namespace
 
+std::optional<LiveHeadPhoto> head_photo_of(const MappedFrame& frame) {
+  if (frame.number == 0) return std::nullopt;
+  LiveHeadPhoto photo{frame.camera, {}};
+  const auto area = [](const std::array<float, 4>& box) { return (box[2] - box[0]) * (box[3] - box[1]); };
+  for (uint32_t i = 0; i < frame.people.size(); ++i) {
+    const auto box = frame.result->head_box_px(i);
+    if (box && (!photo.box_px || area(*box) > area(*photo.box_px))) photo.box_px = box;
+  }
+  return photo;
+}
+
 LiveHead::LiveHead(const Context& context, const std::string& bundle_path, int threads, std::function<void()> on_change)
     : context_(context), bundle_path_(bundle_path), threads_(threads), on_change_(std::move(on_change)) {
   fits_ = std::thread([this] { run_fits(); });

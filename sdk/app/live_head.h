@@ -18,6 +18,7 @@
 #include <thread>
 #include <vector>
 
+#include "app/mapped_frame.h"
 #include "app/rgba_image.h"
 #include "app/triple_buffer.h"
 
@@ -27,6 +28,9 @@ struct LiveHeadPhoto {
   RgbaImage image;
   std::optional<std::array<float, 4>> box_px;  // of the head, as in maq_head_photo; nothing: it is detected
 };
+
+// The frame with the largest head in it; nothing before the first frame.
+std::optional<LiveHeadPhoto> head_photo_of(const MappedFrame& frame);
 
 struct LiveHeadView {
   int width_px = 640, height_px = 480;  // at most; over the photo the image has the photo's shape

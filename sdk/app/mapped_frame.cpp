@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <utility>
 
 namespace maquette {
@@ -23,6 +24,22 @@ void add_skeletons(const DensePoseResult& result, std::vector<std::array<float, 
 }
 
 }  // namespace
+
+std::string label_of(const maq_densepose_person& person) {
+  char text[40];
+  std::snprintf(text, sizeof text, "#%lld %.2f", static_cast<long long>(person.id), double(person.score));
+  return text;
+}
+
+std::array<float, 25 * 3> part_colours() {
+  std::array<float, 25 * 3> colours{};
+  for (int32_t part = 0; part < 25; ++part) {
+    uint8_t rgb[3];
+    maq_densepose_get_part_colour(part, rgb);
+    for (size_t channel = 0; channel < 3; ++channel) colours[3 * size_t(part) + channel] = float(rgb[channel]) / 255;
+  }
+  return colours;
+}
 
 void MappedFrame::copy_from(PipelineResult mapped, double rate, std::vector<uint8_t>* seen_before,
                             GrowingTexture* growing) {

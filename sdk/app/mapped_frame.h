@@ -5,12 +5,18 @@
 #include <cstdint>
 #include <maquette/maquette.hpp>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "app/growing_texture.h"
 #include "app/rgba_image.h"
 
 namespace maquette {
+
+// Id and score, as "#7 0.98".
+std::string label_of(const maq_densepose_person& person);
+// Red, green and blue of parts 0 to 24, from 0 to 1.
+std::array<float, 25 * 3> part_colours();
 
 struct MappedFrame {
   static constexpr size_t kSeenCells = 16;  // of each chart, along U and along V

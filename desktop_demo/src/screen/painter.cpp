@@ -1,8 +1,8 @@
 #include "screen/painter.h"
 
+#include <app/body_camera.h>
 #include <epoxy/gl.h>
 
-#include <cmath>
 #include <stdexcept>
 
 #include "screen/shaders.h"
@@ -40,13 +40,7 @@ unsigned linked(const char* vertex_source, const char* fragment_source) {
   glGetProgramiv(program, GL_LINK_STATUS, &fine);
   if (fine == 0) throw std::runtime_error("This OpenGL cannot link the shaders of the demo; update its driver.");
   glUseProgram(program);
-  float colours[25][3];
-  for (int part = 0; part < 25; ++part) {
-    uint8_t rgb[3];
-    maq_densepose_get_part_colour(part, rgb);
-    for (int channel = 0; channel < 3; ++channel) colours[part][channel] = float(rgb[channel]) / 255;
-  }
-  glUniform3fv(glGetUniformLocation(program, "part_colours"), 25, colours[0]);
+  glUniform3fv(glGetUniformLocation(program, "part_colours"), 25, maquette::part_colours().data());
   int unit = kFirstUnit;
   for (const char* const name : kTextureNames) glUniform1i(glGetUniformLocation(program, name), unit++);
   return program;
@@ -98,6 +92,10 @@ void Painter::set_frame(const maquette::MappedFrame& frame) {
   const int width_px = frame.camera.width_px, height_px = frame.camera.height_px;
   upload(kCameraTexture, width_px, height_px, frame.camera.rgba.data());
   upload(kIuvTexture, width_px, height_px, frame.iuv.data());
+  if (frame.texture != nullptr && frame.texture != person_) {
+    upload(kPersonTexture, frame.texture->width_px, frame.texture->height_px, frame.texture->rgba.data());
+  }
+  person_ = frame.texture;
   people_ = int(frame.people.size());
   activate(kSeenTexture);
   glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R8, kSeenCells, kSeenCells, 24, 0, GL_RED, GL_UNSIGNED_BYTE,
@@ -107,10 +105,6 @@ void Painter::set_frame(const maquette::MappedFrame& frame) {
 void Painter::set_outfit(const maquette::RgbaImage& outfit) {
   upload(kOutfitTexture, outfit.width_px, outfit.height_px, outfit.rgba.data());
   outfit_is_atlas_ = outfit.width_px * 3 == outfit.height_px * 2;
-}
-
-void Painter::set_texture(const maquette::RgbaImage& texture) {
-  upload(kPersonTexture, texture.width_px, texture.height_px, texture.rgba.data());
 }
 
 void Painter::set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
@@ -159,24 +153,16 @@ void Painter::draw_scene(const Rect& rect, float slider) {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-void Painter::draw_body(const Rect& rect, float yaw, float pitch, bool in_own_colours) {
+void Painter::draw_body(const Rect& rect, float yaw, float pitch) {
   if (body_vertex_count_ == 0) return;
   use(body_program_, rect);
   glEnable(GL_DEPTH_TEST);
   glClear(GL_DEPTH_BUFFER_BIT);
   glBindVertexArray(body_vertices_);
-  // The body stands on z = 0, faces -y and is under 2 m tall and wide; seen from far away.
-  const float eye[] = {std::sin(yaw) * std::cos(pitch), -std::cos(yaw) * std::cos(pitch), std::sin(pitch)};
-  const float right[] = {std::cos(yaw), std::sin(yaw), 0};
-  const float up[] = {-std::sin(yaw) * std::sin(pitch), std::cos(yaw) * std::sin(pitch), std::cos(pitch)};
-  const float x = float(rect.height) / float(rect.width), middle = 0.85f;
-  const float projection[4][4] = {{right[0] * x, up[0], -eye[0] / 4, 0},
-                                  {right[1] * x, up[1], -eye[1] / 4, 0},
-                                  {right[2] * x, up[2], -eye[2] / 4, 0},
-                                  {0, -middle * up[2], middle * eye[2] / 4, 1}};
-  glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, projection[0]);
-  glUniform3fv(uniform("towards_eye"), 1, eye);
-  glUniform1i(uniform("in_own_colours"), in_own_colours ? 1 : 0);
+  const maquette::BodyCamera camera(yaw, pitch, rect.width, rect.height);
+  glUniformMatrix4fv(uniform("projection"), 1, GL_FALSE, camera.projection.data());
+  glUniform3fv(uniform("towards_eye"), 1, camera.towards_eye.data());
+  glUniform1i(uniform("in_own_colours"), person_ != nullptr ? 1 : 0);
   glDrawArrays(GL_TRIANGLES, 0, body_vertex_count_);
   glDisable(GL_DEPTH_TEST);
 }

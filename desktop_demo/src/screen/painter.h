@@ -17,8 +17,6 @@ class Painter {
   // repeated over the body's front and back.
   void set_outfit(const maquette::RgbaImage& outfit);
   void set_body(const maquette::DensePoseMesh& body);
-  // Colours of a person on the body, as maq_densepose_texture_draw describes them.
-  void set_texture(const maquette::RgbaImage& texture);
   void set_scene(const maquette::RgbaImage& rendering, const maquette::RgbaImage& photo,
                  const maquette::RgbaImage& sample = {});
 
@@ -26,8 +24,9 @@ class Painter {
   // `slider`: the fraction of the width that shows the photo; kSample: the sample.
   static constexpr float kSample = 2;
   void draw_scene(const Rect& rect, float slider);
-  // Draws the body from a direction, in radians, in the colours of the person or with seen parts in colours of parts.
-  void draw_body(const Rect& rect, float yaw, float pitch, bool in_own_colours);
+  // Draws the body from a direction, in radians, in the colours of the person if the frame has them, or with seen parts
+  // in colours of parts.
+  void draw_body(const Rect& rect, float yaw, float pitch);
 
  private:
   enum Texture {
@@ -52,4 +51,5 @@ class Painter {
   unsigned no_vertices_ = 0, body_vertices_ = 0, body_buffer_ = 0;
   int body_vertex_count_ = 0, people_ = 0;
   bool outfit_is_atlas_ = false;
+  std::shared_ptr<const maquette::RgbaImage> person_;  // the texture in kPersonTexture
 };

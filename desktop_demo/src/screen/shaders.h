@@ -151,17 +151,13 @@ uniform sampler2D person;
 uniform vec3 part_colours[25], towards_eye;
 uniform bool in_own_colours;
 void main() {
-  float slope = abs(dot(normalize(facing), towards_eye));
-  vec3 shown;
-  float known, light = 0.35 + 0.65 * slope;
+  float slope = abs(dot(normalize(facing), towards_eye)), light = 0.35 + 0.65 * slope;
+  vec3 shown = part_colours[part + 1] * 1.15;
+  float known = smoothstep(0.1, 0.6, texture(seen, vec3(uv, part)).r);
   if (in_own_colours) {
     vec4 texel = in_atlas(person, part, uv);
-    shown = texel.rgb;
-    known = smoothstep(0.0, 0.5, texel.a);
+    shown = texel.rgb, known = smoothstep(0.0, 0.5, texel.a);
     light = mix(light, 0.75 + 0.25 * slope, known);  // the photo has its own light
-  } else {
-    shown = part_colours[part + 1] * 1.15;
-    known = smoothstep(0.1, 0.6, texture(seen, vec3(uv, part)).r);
   }
   colour = vec4(mix(vec3(0.30, 0.31, 0.34), shown, known) * light, 1.0);
 })";

@@ -181,7 +181,7 @@ TEST(LiveDensePose, CallsReturnWhileItWorks) {
     live.set_paused(i % 2 == 0);
     live.set_recording("");
     EXPECT_EQ(live.status().state, MAQ_PIPELINE_OPENING);
-    EXPECT_TRUE(!live.surface() || live.surface()->nodes > 1);
+    EXPECT_TRUE(!live.body() || live.body()->nodes > 1);
   }
 }
 

@@ -92,7 +92,10 @@ TEST_F(MappedFrame, HasTheColoursOfThePersonWhoIsFollowed) {
   // It is drawn anew after eight frames only, and begins again with another source.
   frame.copy_from(std::move(again), 1, &seen_, &growing);
   EXPECT_EQ(frame.texture, first);
-  growing.begin_again();
+  growing.set_source("");
+  frame.copy_from(mapped(), 1, &seen_, &growing);
+  EXPECT_EQ(frame.texture, first);
+  growing.set_source("another");
   frame.copy_from(mapped(), 1, &seen_, &growing);
   EXPECT_NE(frame.texture, first);
   EXPECT_EQ(frame.texture->rgba, first->rgba);

@@ -38,7 +38,7 @@ ResidualRefiner::ResidualRefiner(std::shared_ptr<const OnnxRuntimeLibrary> runti
   require_tensors(manifest, "mended", "inputs", graph.inputs, {{"pictures", given}, {"times", times}});
   require_tensors(manifest, "mended", "outputs", graph.outputs, {{"picture", bundle.frame_shape()}});
   session_ = open_session(std::move(runtime), bundle.bundle.files.at(graph.file), graph,
-                                       bundle.bundle.path_of(graph.file), settings);
+                          bundle.bundle.path_of(graph.file), settings);
   values_ = size_t(side) * size_t(side) * 3;
   given_.resize((before_ + 1) * values_);
   inputs_ = {{given_.data(), given}, {times_.data(), times}};

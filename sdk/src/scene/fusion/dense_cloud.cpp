@@ -9,8 +9,8 @@
 namespace maq {
 namespace {
 
-constexpr double kDepthFraction = 0.85;  // of the time
-constexpr size_t kVoters = 8;            // neighbours whose depth is asked about a point
+constexpr double kShareOfDepth = 0.85;  // of the time
+constexpr size_t kVoters = 8;           // neighbours whose depth is asked about a point
 // With few photos few neighbours can confirm a depth: then all depth counts (docs/research/scenes.md, "Fusion").
 constexpr size_t kPhotosWithTrust = 30;
 constexpr int kTrust = 5;
@@ -58,7 +58,7 @@ bool find_depth(const std::vector<StereoPhoto>& photos, const PointPositions& po
   SemiGlobal smooth;
   maps.resize(photos.size());
   for (size_t i = 0; i < photos.size(); ++i) {
-    const double fraction = kDepthFraction * double(i) / double(photos.size());
+    const double fraction = kShareOfDepth * double(i) / double(photos.size());
     if (progress && !progress(fraction, text_of_step(i, photos.size()))) return false;
     DepthMap& map = maps[i];
     map.camera = cameras[i];
@@ -89,8 +89,7 @@ std::optional<DenseCloud> make_dense_cloud(const DenseCloudInput& input, const D
   rule.min_trust = input.photos < kPhotosWithTrust ? 0 : kTrust;
   bool is_cancelled = false;
   std::vector<FusedPixel> pixels = fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
-    is_cancelled =
-        progress && !progress(kDepthFraction + (1 - kDepthFraction) * done, "Fusing the depth of all photos");
+    is_cancelled = progress && !progress(kShareOfDepth + (1 - kShareOfDepth) * done, "Fusing the depth of all photos");
     return !is_cancelled;
   });
   if (is_cancelled) return {};

@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-constexpr int kTaskRows = 16;
+constexpr int kVoteRows = 16;
 constexpr double kVotingFraction = 0.49;  // of the time, of each of the two passes
 
 size_t width_of(const DepthMap& map) { return size_t(map.camera.width_px); }
@@ -67,9 +67,9 @@ void for_votes(const std::vector<DepthMap>& maps, size_t of, WorkerThreads& thre
   std::vector<Projection> projections;
   for (const uint32_t k : map.neighbours) projections.push_back(projection_of(map.camera, maps[k].camera));
   const size_t width = width_of(map), height = height_of(map);
-  threads.run((height + kTaskRows - 1) / kTaskRows, [&](size_t task, int) {
+  threads.run((height + kVoteRows - 1) / kVoteRows, [&](size_t task, int) {
     ProjectedRow row(width);
-    for (size_t y = task * kTaskRows; y < std::min((task + 1) * kTaskRows, height); ++y) {
+    for (size_t y = task * kVoteRows; y < std::min((task + 1) * kVoteRows, height); ++y) {
       const size_t first = y * width;
       for (size_t k = 0; k < projections.size(); ++k) {
         project_row(projections[k], int(y), &map.depth[first], int(width), row.pixels.data(), row.depths.data());

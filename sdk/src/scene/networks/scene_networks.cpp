@@ -148,8 +148,7 @@ const float* SceneNetworks::extract(const float* photo, int width_px, int height
     SessionSettings settings = settings_;
     settings.plans_memory = false;
     settings.provider = MAQ_PROVIDER_CPU;  // others want to know the sizes
-    extractor_ =
-        open_session(runtime_, bundle_.files.at(spec.file), spec, bundle_.path_of(spec.file), settings);
+    extractor_ = open_session(runtime_, bundle_.files.at(spec.file), spec, bundle_.path_of(spec.file), settings);
   }
   return extractor_->run({{photo, {1, height_px, width_px, kColours}}}, {{1, height_px, width_px, kFeatures}})[0].data;
 }

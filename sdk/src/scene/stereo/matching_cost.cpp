@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-constexpr int kBandRows = 32;
+constexpr int kCostBandRows = 32;
 // The four pixels from each one to the right and down, as one number: a sample is one load.
 void pack_quads(const StereoPhoto& photo, std::vector<uint32_t>& quads) {
   const int width = photo.camera.width_px, height = photo.camera.height_px;
@@ -143,9 +143,9 @@ void MatchingCost::compute(const StereoPhoto& photo, const std::vector<const Ste
       measure_windows(grey, sum_, scale_);
     }
   });
-  const size_t bands = size_t(height_px_ + kBandRows - 1) / kBandRows;
+  const size_t bands = size_t(height_px_ + kCostBandRows - 1) / kCostBandRows;
   threads.run(bands, [&](size_t band, int) {
-    const int top = int(band) * kBandRows, bottom = std::min(top + kBandRows, height_px_);
+    const int top = int(band) * kCostBandRows, bottom = std::min(top + kCostBandRows, height_px_);
     const size_t pixels = size_t(bottom - top) * width;
     BandCost of_band(grey, sum_.data(), scale_.data());
     std::vector<uint8_t> planes_of_band(pixels * DepthPlanes::kCount), of_neighbour[kMaxNeighbours];

@@ -6,7 +6,7 @@
 namespace maq {
 namespace {
 
-constexpr double kDegrees = 57.29577951308232;
+constexpr double kDegreesInRadian = 57.29577951308232;
 constexpr double kBestAngle = 6, kAngleWidth = 6;  // degrees between two cameras at a point
 constexpr double kMinAngle = 0.1;                  // below it depth cannot be measured
 constexpr double kShareOfAll = 0.05;               // of a photo's goodness for points that have two good ones already
@@ -37,7 +37,7 @@ std::vector<Seen> points_in_image(const PinholeCamera& camera, const std::vector
   return seen;
 }
 
-double value_at(std::vector<double>& values, double fraction) {
+double value_at_fraction(std::vector<double>& values, double fraction) {
   const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1) + 0.5);
   std::nth_element(values.begin(), at, values.end());
   return *at;
@@ -69,14 +69,14 @@ Pair compare_photos(const PinholeCamera& a, const PinholeCamera& b, const std::v
     }
     const double cosine = dot / std::sqrt(length_a * length_b);
     if (std::isfinite(cosine)) {
-      const double angle = std::acos(std::min(std::max(cosine, -1.0), 1.0)) * kDegrees;
+      const double angle = std::acos(std::min(std::max(cosine, -1.0), 1.0)) * kDegreesInRadian;
       const double off = (angle - kBestAngle) / kAngleWidth;
       angles.push_back(angle);
       pair.goodness[i] = float(std::exp(-off * off));
     }
     ++i, ++j;
   }
-  if (angles.size() < kMinShared || !(value_at(angles, 0.5) >= kMinAngle)) return pair;
+  if (angles.size() < kMinShared || !(value_at_fraction(angles, 0.5) >= kMinAngle)) return pair;
   for (const float goodness : pair.goodness) pair.sum += double(goodness);
   return pair;
 }
@@ -133,8 +133,8 @@ std::vector<ViewPlan> plan_views(const std::vector<PinholeCamera>& cameras, cons
     plans[i].neighbours = chosen_neighbours(pairs, seen[i].size(), max_neighbours);
     std::vector<double> depths;
     for (const Seen& point : seen[i]) depths.push_back(point.depth);
-    plans[i].near = kNearMargin * value_at(depths, kNearFraction);
-    plans[i].far = kFarMargin * value_at(depths, 1 - kNearFraction);
+    plans[i].near = kNearMargin * value_at_fraction(depths, kNearFraction);
+    plans[i].far = kFarMargin * value_at_fraction(depths, 1 - kNearFraction);
   }
   return plans;
 }

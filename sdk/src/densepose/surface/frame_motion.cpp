@@ -7,8 +7,8 @@
 namespace maq {
 namespace {
 
-constexpr int kLongSide = 320;  // of the fine level, at most; the coarse level has half of it
-constexpr int kBlock = 8;       // side of a block, in pixels of the fine level
+constexpr int kLongSide = 320;   // of the fine level, at most; the coarse level has half of it
+constexpr int kMotionBlock = 8;  // side of a block, in pixels of the fine level
 // Half of the side of the window around a block's middle that is compared, and how far it is looked for, at each level.
 constexpr int kFineHalf = 8, kFineReach = 1, kCoarseHalf = 4, kCoarseReach = 6;
 // A block has moved if that fits better than rest by so much a pixel: noise moves nothing.
@@ -145,15 +145,15 @@ void FrameMotion::next(const ImageView& image, bool follows_last) {
 
   is_known_ = follows_last && is_same_size && before_.fine.values.size() == fine.values.size() &&
               std::min(fine.width, fine.height) >= 2 * kFineHalf;
-  columns_ = (fine.width + kBlock - 1) / kBlock;
-  rows_ = (fine.height + kBlock - 1) / kBlock;
+  columns_ = (fine.width + kMotionBlock - 1) / kMotionBlock;
+  rows_ = (fine.height + kMotionBlock - 1) / kMotionBlock;
   blocks_.resize(size_t(columns_) * size_t(rows_));
   is_matched_.assign(blocks_.size(), 0);
 }
 
 const FrameMotion::Motion& FrameMotion::at(const Point& point) {
   const auto block = [&](double px, int count) {
-    return int(std::clamp(px / (step_ * kBlock), 0.0, double(count - 1)));
+    return int(std::clamp(px / (step_ * kMotionBlock), 0.0, double(count - 1)));
   };
   const int column = block(point.x, columns_), row = block(point.y, rows_);
   const size_t index = size_t(row) * size_t(columns_) + size_t(column);
@@ -165,7 +165,7 @@ const FrameMotion::Motion& FrameMotion::at(const Point& point) {
 }
 
 FrameMotion::Motion FrameMotion::matched(int column, int row) const {
-  const int x = column * kBlock + kBlock / 2, y = row * kBlock + kBlock / 2;
+  const int x = column * kMotionBlock + kMotionBlock / 2, y = row * kMotionBlock + kMotionBlock / 2;
   const Vector rough = Window<kCoarseHalf>(now_.coarse, before_.coarse, x / 2, y / 2).best({}, kCoarseReach);
   const Window<kFineHalf> fine(now_.fine, before_.fine, x, y);
   const Vector motion = fine.best({2 * rough.x, 2 * rough.y}, kFineReach);

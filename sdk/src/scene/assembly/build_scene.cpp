@@ -70,7 +70,8 @@ std::optional<PointCloud> cloud_from_depth(const Capture& capture, const std::ve
   wanted.threads = options.fitting.threads;
   std::optional<DenseCloud> made = make_dense_cloud(input, wanted, progress);
   if (!made) return {};
-  return made->cloud.count() < capture.cloud.count() ? capture.cloud : std::move(made->cloud);
+  if (made->cloud.count() < capture.cloud.count()) return capture.cloud;
+  return std::move(made->cloud);
 }
 
 }  // namespace
@@ -148,7 +149,7 @@ std::optional<BuiltScene> build_scene(const Capture& capture, const std::shared_
     if (!cloud) return {};
   }
   const BuildProgress progress = part_of(whole, computes_depth ? kDepthFraction : 0, 1);
-  SceneBuilder builder(cloud ? std::move(*cloud) : capture.cloud, capture.up, networks, options);
+  SceneBuilder builder(cloud ? *cloud : capture.cloud, capture.up, networks, options);
   ImportReport report;
   size_t unusable = 0;
   for (size_t i = 0; i < views.size(); ++i) {

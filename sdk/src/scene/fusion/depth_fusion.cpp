@@ -162,8 +162,9 @@ PointCloud points_of(const std::vector<DepthMap>& maps, const std::array<double,
     const DepthMap& map = maps[at.map];
     const PinholeCamera& camera = map.camera;
     const double depth = double(map.depth[at.pixel]);
-    const double ray[3] = {(double(at.pixel % width_of(map)) - camera.cx_px) / camera.fx_px * depth,
-                           (double(at.pixel / width_of(map)) - camera.cy_px) / camera.fy_px * depth, depth};
+    const size_t column = at.pixel % width_of(map), row_of_pixel = at.pixel / width_of(map);
+    const double ray[3] = {(double(column) - camera.cx_px) / camera.fx_px * depth,
+                           (double(row_of_pixel) - camera.cy_px) / camera.fy_px * depth, depth};
     double point[3];
     for (size_t k = 0; k < 3; ++k) {
       point[k] = camera.centre[k];

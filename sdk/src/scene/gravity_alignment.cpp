@@ -60,8 +60,8 @@ PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::arra
         high = std::max(high, at);
       }
     }
-    constexpr double kFarthest = 1 << 20;
-    if (!(std::abs(low) <= kFarthest && std::abs(high) <= kFarthest)) {
+    constexpr double kFarthestPx = 1 << 20;
+    if (!(std::abs(low) <= kFarthestPx && std::abs(high) <= kFarthestPx)) {
       throw Error(MAQ_ERROR_INVALID_ARGUMENT, "A gravity-aligned picture would reach from pixel ", low, " to ", high,
                   ": the camera's focal lengths (", camera.fx_px, " and ", camera.fy_px, ") or its principal point (",
                   camera.cx_px, ", ", camera.cy_px, ") cannot be right.");

@@ -234,7 +234,7 @@ TEST(HeadFit, StepsThatExplodeAreRefusedAndTheBestHeadIsKept) {
 
 TEST(HeadFit, AfterARefusedStepItGoesOnFromTheBestHead) {
   HeadFitOptions options = independent_cells(100);
-  options.shape_rate = 10;
+  options.shape_rate = 6;  // from 4 on steps are refused; from 8 on the end depends on the last bits of a processor
   const HeadFit fit = fit_of({photo_for_fit(camera_at(6, 900, 0.2), 1)}, options);
   EXPECT_GT(fit.stats.refused, 0);
   EXPECT_NE(fit.stats.end, HeadFitEnd::kRefused);

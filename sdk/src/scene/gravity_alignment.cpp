@@ -67,9 +67,9 @@ PinholeCamera gravity_aligned_frame(const PinholeCamera& camera, const std::arra
                   camera.cx_px, ", ", camera.cy_px, ") cannot be right.");
     }
     // A rotation by an angle of rounding size must not widen the frame by a pixel.
-    constexpr double kRounding = 1e-6;
-    first[i] = int(std::floor(low + 0.5 + kRounding));
-    const int whole = int(std::ceil(high + 0.5 - kRounding)) - first[i];
+    constexpr double kRoundingPx = 1e-6;
+    first[i] = int(std::floor(low + 0.5 + kRoundingPx));
+    const int whole = int(std::ceil(high + 0.5 - kRoundingPx)) - first[i];
     size[i] = round_up(whole, multiple);
   }
   aligned.width_px = size[0];

@@ -204,7 +204,7 @@ Capture open_transforms(const std::string& folder, const std::string& file_name)
 std::string how_to_find_cameras(const std::string& path) {
   return concatenate(
       " To find the cameras and make the scene: pip install 'maquette[scenes]', then python -m maquette ",
-      "scene make ", path, " --out place.maqs");
+      "scene make ", path, " --out place.maqs.");
 }
 
 Capture open_any(const std::string& folder) {

@@ -95,8 +95,9 @@ QuantizedConvolution::QuantizedConvolution(const Windows& windows, int inputs, i
       for (size_t tap = 0; tap < taps; ++tap) {
         const size_t block = size_t(output) / kBlock, pair = size_t(input) / 2;
         const size_t place = ((block * taps + tap) * size_t(inputs) / 2 + pair) * kBlock + size_t(output) % kBlock;
-        weights_[2 * place + size_t(input) % 2] =
-            weights[(size_t(output) * size_t(inputs) + size_t(input)) * taps + tap];
+        // Weights are numbers, not characters.
+        const size_t from = (size_t(output) * size_t(inputs) + size_t(input)) * taps + tap;
+        weights_[2 * place + size_t(input) % 2] = weights[from];  // NOLINT(bugprone-signed-char-misuse)
       }
     }
   }
@@ -170,7 +171,7 @@ QuantizedDepthwise::QuantizedDepthwise(const Windows& windows, int channels, con
   for (size_t channel = 0; channel < size_t(channels); ++channel) {
     for (size_t tap = 0; tap < taps; ++tap) {
       const size_t place = (channel / kBlock * pairs + tap / 2) * kBlock + channel % kBlock;
-      weights_[2 * place + tap % 2] = weights[channel * taps + tap];
+      weights_[2 * place + tap % 2] = weights[channel * taps + tap];  // NOLINT(bugprone-signed-char-misuse)
     }
   }
 }

@@ -1,6 +1,6 @@
 #include "screen/painter.h"
 
-#include <app/body_camera.h>
+#include <app/live_densepose.h>
 #include <epoxy/gl.h>
 
 #include <stdexcept>

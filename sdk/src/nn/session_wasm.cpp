@@ -29,7 +29,7 @@ bool fits(const std::vector<int64_t>& actual, const std::vector<Dimension>& expe
   });
 }
 
-// Where each tensor of the manifest is among those of the graph.
+// Returns the place of each tensor of the manifest in the list of the graph.
 std::vector<size_t> places(const char* kind, const std::vector<OnnxValueInfo>& graph,
                            const std::vector<TensorSpec>& specs, const std::string& name) {
   std::vector<size_t> found;

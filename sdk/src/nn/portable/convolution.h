@@ -39,7 +39,7 @@ class TapAddresses {
   std::vector<const Value*> addresses_;
 };
 
-// Sums of products with 8 bits, and their quantization: exactly those of ONNX Runtime's QLinearConv.
+// Sums of products with 8 bits, and their quantization. The results equal those that ONNX Runtime's QLinearConv gives.
 class QuantizedConvolution : public Layer {
  public:
   // weights[output channel][input channel][row][column]; bias may be empty. scales[output channel] multiplies sums.

@@ -103,8 +103,8 @@ class Concatenation : public Layer {
   size_t axis_;
 };
 
-// The same values with other extents: those given, where 0 keeps the input's and -1 takes the rest; or, without any
-// given, those of the second input.
+// The same values with other extents. Of the extents that are given, 0 keeps the input's and -1 takes the rest. Without
+// any given, the extents of the second input count.
 class Reshape : public Layer {
  public:
   explicit Reshape(std::vector<int64_t> extents) : extents_(std::move(extents)) {}

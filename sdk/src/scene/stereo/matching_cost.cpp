@@ -9,6 +9,7 @@ namespace maq {
 namespace {
 
 constexpr int kCostBandRows = 32;
+
 // The four pixels from each one to the right and down, as one number: a sample is one load.
 void pack_quads(const StereoPhoto& photo, std::vector<uint32_t>& quads) {
   const int width = photo.camera.width_px, height = photo.camera.height_px;

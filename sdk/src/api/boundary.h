@@ -16,7 +16,9 @@ namespace maq {
 class ArgumentError : public Error {
  public:
   template <class... Parts>
-  explicit ArgumentError(const Parts&... parts) : Error(MAQ_ERROR_INVALID_ARGUMENT, parts...) {}
+  [[gnu::always_inline]] explicit ArgumentError(const Parts&... parts)
+      : ArgumentError(std::initializer_list<TextPart>{TextPart(parts)...}) {}
+  explicit ArgumentError(std::initializer_list<TextPart> parts);
 };
 
 // The texts that calls gave to a thread, so that no call waits for another and no text is freed while it is read.
@@ -39,73 +41,71 @@ extern const char kIsOfParent[];
 // The text of the handle, or the thread's latest for NULL; it stays until the thread calls this again.
 const char* last_error(const Handle* handle) noexcept;
 
+// A function without arguments that returns a status or throws, of any type.
+class Call {
+ public:
+  template <class Body>
+  explicit Call(Body& body)
+      : body_(&body), run_([](const void* found) { return (*static_cast<Body*>(const_cast<void*>(found)))(); }) {}
+
+  maq_status operator()() const { return run_(body_); }
+
+ private:
+  const void* body_;
+  maq_status (*run_)(const void*);
+};
+
 // Runs `body`, which returns a status or throws. Nothing gets past this.
+maq_status run_guarded(const Handle* handle, const char* function, const Call& body) noexcept;
+
 template <class Body>
 maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
-  try {
-    if (handle != nullptr && handle->handle_state().is_of_parent()) {
-      return keep_error(nullptr, MAQ_ERROR_INVALID_ARGUMENT, function, kIsOfParent);
-    }
-    return body();
-  } catch (const ArgumentError& error) {
-    return keep_error(handle, error.status(), function, error.what());
-  } catch (const Error& error) {
-    return keep_error(handle, error.status(), nullptr, error.what());
-  } catch (...) {
-    const Failure failure = current_failure();
-    return keep_error(handle, failure.status, failure.status == MAQ_ERROR_INTERNAL ? function : nullptr, failure.text);
-  }
+  return run_guarded(handle, function, Call(body));
 }
 
-// Also checks that a handle has this type, belongs to this process and is held by the app.
+[[noreturn]] void refuse_null(const char* name);
+
+// Checks that a handle has this kind, belongs to this process and is held by the app.
+void require_handle(const Handle& handle, HandleKind kind, const char* name);
+
 template <class T>
 void require_argument(const T* pointer, const char* name) {
-  if (pointer == nullptr) throw ArgumentError(name, " is NULL.");
-  if constexpr (std::is_base_of_v<Handle, T>) {
-    if (!pointer->handle_state().is_held_as(T::kKind)) pointer->handle_state().refuse(T::kKind, name);
-    if (pointer->handle_state().is_of_parent()) throw ArgumentError(kIsOfParent);
-  }
+  if (pointer == nullptr) refuse_null(name);
+  if constexpr (std::is_base_of_v<Handle, T>) require_handle(*pointer, T::kKind, name);
 }
 
 // guarded() for functions that run one at a time on a handle: a second call at the same time, from another thread or
 // from a callback of the first, is an ArgumentError.
+maq_status run_alone(const Handle* handle, HandleKind kind, const char* name, const char* function,
+                     const Call& body) noexcept;
+
 template <class T, class Body>
 maq_status guarded_alone(const T* handle, const char* name, const char* function, Body&& body) noexcept {
-  // Until the error has been kept with the handle too.
-  struct Call {
-    HandleState* state;
-    ~Call() {
-      if (state != nullptr) state->end_call();
-    }
-  };
-  const Call call{handle != nullptr && handle->handle_state().begin_call(T::kKind) ? &handle->handle_state() : nullptr};
-  return guarded(handle, function, [&] {
-    require_argument(handle, name);
-    if (call.state == nullptr) {
-      throw ArgumentError(name, " is in use by another call; let that return first, or make one for each thread.");
-    }
-    return body();
-  });
+  return run_alone(handle, T::kKind, name, function, Call(body));
 }
 
 enum class WhileInUse { kRefused, kAllowed };
 
 // For `_destroy`, `_close` and `_release`: `reclaim` gets the handle unless it is NULL. The app keeps handles that it
 // cannot give back: a handle of another type, one that was given back before, or one with a running call.
+void take_back(Handle* handle, HandleKind kind, const char* name, const char* function, const Call& reclaim,
+               WhileInUse while_in_use) noexcept;
+
+template <class T, class Reclaim>
+struct Reclaiming {
+  maq_status operator()() const {
+    reclaim(handle);
+    return MAQ_OK;
+  }
+  T* handle;
+  Reclaim& reclaim;
+};
+
 template <class T, class Reclaim>
 void return_handle(T* handle, const char* name, const char* function, Reclaim&& reclaim,
                    WhileInUse while_in_use = WhileInUse::kRefused) noexcept {
-  if (handle == nullptr) return;
-  guarded(nullptr, function, [&] {
-    if (handle->handle_state().is_of_parent()) return MAQ_OK;
-    bool is_in_use = false;
-    if (handle->handle_state().mark_returned(T::kKind, while_in_use == WhileInUse::kAllowed, is_in_use)) {
-      reclaim(handle);
-      return MAQ_OK;
-    }
-    if (is_in_use) throw ArgumentError(name, " is in use by another call, so it was not freed; let that return first.");
-    handle->handle_state().refuse(T::kKind, name);
-  });
+  const Reclaiming<T, Reclaim> call{handle, reclaim};
+  take_back(handle, T::kKind, name, function, Call(call), while_in_use);
 }
 
 template <class T>
@@ -129,26 +129,19 @@ auto call_app(const char* name, Call&& call) {
   }
 }
 
+[[noreturn]] void refuse_range(const TextPart& name, const TextPart& value, const TextPart& min, const TextPart& max);
+
 // `name`: a text, also a std::string.
-template <class Name, class T>
-void require_range(const Name& name, T value, T min, T max) {
-  if (!(value >= min && value <= max)) {
-    throw ArgumentError(name, " is ", value, ", but must be ", min, " to ", max, ".");
-  }
+template <class T>
+void require_range(const TextPart& name, T value, T min, T max) {
+  if (!(value >= min && value <= max)) refuse_range(name, value, min, max);
 }
 
-inline void require_index(const char* name, uint32_t index, size_t count) {
-  if (index >= count) throw ArgumentError(name, " is ", index, ", but there are ", count, " (from 0).");
-}
+void require_index(const char* name, uint32_t index, size_t count);
 
 // Headers and library of one minor version agree on the size of each struct (maq_context_create checks the version), so
 // another size means that the caller did not set struct_size.
-inline void require_struct_size(const char* name, uint32_t size, size_t expected) {
-  if (size != expected) {
-    throw ArgumentError(name, ".struct_size is ", size, ", but this library expects ", expected,
-                        " bytes; set it to sizeof the struct, or fill the struct with its _init function.");
-  }
-}
+void require_struct_size(const char* name, uint32_t size, size_t expected);
 
 // The number that a caller wrote where an enum is expected. C allows any; reading one that the enum does not have is
 // undefined in C++.
@@ -160,18 +153,10 @@ int32_t number_in(const Enum& value) {
   return number;
 }
 
-template <class Name>
-void require_provider(const Name& name, const maq_provider& provider) {
-  require_range(name, number_in(provider), int32_t(MAQ_PROVIDER_CPU), int32_t(MAQ_PROVIDER_NNAPI));
-}
+void require_provider(const TextPart& name, const maq_provider& provider);
 
 // For configs that accept MAQ_THREADS_MEASURED.
-template <class Name>
-void require_threads(const Name& name, int32_t threads, int32_t max) {
-  if (threads == MAQ_THREADS_MEASURED || (threads >= 0 && threads <= max)) return;
-  throw ArgumentError(name, " is ", threads, ", but must be 0 to ", max, ", or MAQ_THREADS_MEASURED (",
-                      MAQ_THREADS_MEASURED, ").");
-}
+void require_threads(const TextPart& name, int32_t threads, int32_t max);
 
 // Returns the caller's config, or the defaults for NULL.
 template <class T>

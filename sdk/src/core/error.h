@@ -1,32 +1,59 @@
 // Failure inside the library: a status and a sentence. src/api turns it into the C API's status and error text.
 #pragma once
 
-#include <locale>
+#include <initializer_list>
 #include <new>
-#include <sstream>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <type_traits>
 
 #include "maquette/types.h"
 
 namespace maq {
 
+// One value of a text, held by reference: it lives no longer than the call it is written in. Texts are put together in
+// one place for all values, since code at each of hundreds of places where errors are thrown would be half the library.
+class TextPart {
+ public:
+  TextPart(const char* text) : print_(print<const char*>), text_(text) {}
+  template <class T>
+  TextPart(const T& value) : print_(print<T>), value_(&value) {}
+
+  void write(std::ostream& text) const { print_(text, *this); }
+
+ private:
+  template <class T>
+  static void print(std::ostream& text, const TextPart& part) {
+    if constexpr (std::is_same_v<T, const char*>) {
+      text << part.text_;
+    } else {
+      text << *static_cast<const T*>(part.value_);
+    }
+  }
+
+  void (*print_)(std::ostream&, const TextPart&);
+  union {
+    const char* text_;
+    const void* value_;
+  };
+};
+
 // Writes numbers in the C locale, for any locale of the app: 1234.5, not 1.234,5.
+std::string join(std::initializer_list<TextPart> parts);
+
 template <class... Parts>
-std::string concatenate(const Parts&... parts) {
-  std::ostringstream text;
-  text.exceptions(std::ios::badbit);  // throws without memory; otherwise the text would end early
-  text.imbue(std::locale::classic());
-  (text << ... << parts);
-  return text.str();
+[[gnu::always_inline]] inline std::string concatenate(const Parts&... parts) {
+  return join({TextPart(parts)...});
 }
 
 class Error : public std::runtime_error {
  public:
   template <class... Parts>
-  explicit Error(maq_status status, const Parts&... parts)
-      : std::runtime_error(concatenate(parts...)), status_(status) {}
+  [[gnu::always_inline]] explicit Error(maq_status status, const Parts&... parts)
+      : Error(status, std::initializer_list<TextPart>{TextPart(parts)...}) {}
+  Error(maq_status status, std::initializer_list<TextPart> parts);
 
   maq_status status() const noexcept { return status_; }
 
@@ -46,21 +73,6 @@ struct Failure {
 
 // Returns the status and text of the exception being handled. Call it in the catch block. Exceptions from outside the
 // library are MAQ_ERROR_INTERNAL.
-inline Failure current_failure() noexcept {
-  try {
-    throw;
-  } catch (const Error& error) {
-    return {error.status(), error.what()};
-  } catch (const std::bad_alloc&) {
-    return {MAQ_ERROR_OUT_OF_MEMORY, kNoMemory};
-  } catch (const std::system_error& error) {
-    const bool is_memory = error.code() == std::errc::not_enough_memory;
-    return {is_memory ? MAQ_ERROR_OUT_OF_MEMORY : MAQ_ERROR_INTERNAL, is_memory ? kNoMemory : error.what()};
-  } catch (const std::exception& error) {
-    return {MAQ_ERROR_INTERNAL, error.what()};
-  } catch (...) {
-    return {MAQ_ERROR_INTERNAL, "An unknown exception was thrown."};
-  }
-}
+Failure current_failure() noexcept;
 
 }  // namespace maq

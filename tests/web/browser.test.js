@@ -1,10 +1,11 @@
 // The page in headless Chromium.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { frames, launch, openPage, pageFolder, serve, status, waitForFrames } from './browser.js';
-import { converted, scratch } from './native.js';
+import { converted, root, scratch } from './native.js';
 
 let server;
 let browser;
@@ -135,6 +136,49 @@ test('memory does not grow with frames', async () => {
     console.log(`the JavaScript heap grew by ${grown.toFixed(2)} MB over 150 frames`);
     assert.ok(grown < 1, `${grown} MB`);
   });
+});
+
+test('the example of the README runs in what Vite builds of an empty project', async () => {
+  const project = join(scratch, 'vite');
+  rmSync(project, { recursive: true, force: true });
+  mkdirSync(project, { recursive: true });
+  writeFileSync(join(project, 'package.json'), '{"type": "module", "private": true}');
+  const tarball = readdirSync(join(root, 'build/web')).find((name) => name.endsWith('.tgz'));
+  execFileSync('npm', ['install', '--silent', '--no-audit', '--no-fund', join(root, 'build/web', tarball)], { cwd: project });
+  const readme = readFileSync(join(project, 'node_modules/maquette/README.md'), 'utf8');
+  writeFileSync(join(project, 'example.js'), readme.match(/```js\n(.*?)```/s)[1]);
+  writeFileSync(
+    join(project, 'main.js'),
+    `const video = document.querySelector('video');
+     video.srcObject = await navigator.mediaDevices.getUserMedia({ video: true });
+     await video.play();
+     await import('./example.js');`,
+  );
+  writeFileSync(
+    join(project, 'index.html'),
+    '<!doctype html><link rel="icon" href="data:"><video muted playsinline></video><script type="module" src="main.js"></script>',
+  );
+  const vite = join(root, 'web/demo/node_modules/.bin/vite');
+  execFileSync(vite, ['build', '--logLevel', 'warn', '--target', 'es2022'], { cwd: project, stdio: 'inherit' });
+  const built = await serve(join(project, 'dist'));
+  const page = await browser.newPage();
+  try {
+    const said = [];
+    const finished = new Promise((resolve, reject) => {
+      page.on('pageerror', reject);
+      page.on('console', (message) => {
+        said.push(message.text());
+        if (/^in the middle: /.test(message.text())) resolve();
+      });
+      setTimeout(() => reject(new Error(`the example did not end; it said: ${said}`)), 120000).unref();
+    });
+    await page.goto(built.url);
+    await finished;
+    assert.match(said.join('\n'), /^person 1: [01]\.\d\d, box \d+(,\d+){3}$/m);
+  } finally {
+    await page.close();
+    built.close();
+  }
 });
 
 test('a phone screen shows everything without scrolling sideways', async () => {

@@ -9,9 +9,12 @@ namespace maq {
 namespace {
 
 constexpr int kDepthPlanes = DepthPlanes::kCount;
-// Costs of a step of one plane between neighbours, and of more, as parts of MatchingCost::kWorst.
-constexpr uint8_t kSmallStep = 8, kLargeStep = 50;
-constexpr uint8_t kMaxCost = 75;  // of a depth that is believed
+// Costs of a step of one plane between neighbours, and of more, as parts of MatchingCost::kWorst. A large step costs as
+// much as bytes have room for. Both, and the limit of what is believed, are chosen by docs/research/scenes.md, "Depth
+// and fusion": doubtful depth is better than none, since nothing is rendered where no point is.
+constexpr uint8_t kSmallStep = 8, kLargeStep = 68;
+constexpr uint8_t kMaxCost = 90;  // of a depth that is believed
+static_assert(3 * (MatchingCost::kWorst + kLargeStep) / 2 <= 255, "the halves of three paths are a byte");
 constexpr int kStripColumns = 16;
 
 // Costs of a path's last pixel, with a plane that is never taken on either side.

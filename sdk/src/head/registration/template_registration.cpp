@@ -278,8 +278,13 @@ class Registration {
   void measure() {
     evaluate_field();
     result_.colours.resize(3 * count_);
+    result_.template_points = head_.points;
     for (size_t i = 0; i < count_; ++i) {
-      for (size_t c = 0; c < 3; ++c) result_.colours[3 * i + c] = values_[(7 + c) * count_ + i];
+      const bool is_found = is_on_surface(head_.kinds[i]) && length(residual(i)) <= kLostResidual_dm;
+      for (size_t c = 0; c < 3; ++c) {
+        result_.colours[3 * i + c] = values_[(7 + c) * count_ + i];
+        if (is_found) result_.template_points[3 * i + c] = values_[(4 + c) * count_ + i];
+      }
     }
     size_t count = 0;
     for (const size_t i : surface_) {

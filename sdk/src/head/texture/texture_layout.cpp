@@ -7,7 +7,6 @@
 namespace maq::head {
 namespace {
 
-constexpr Vec3 kLayoutCentre{0, 0, -0.6};  // dm, of the template head: from there least of the surface is hidden
 constexpr double kDiscRadius = 0.485;
 constexpr double kLargestAngle = 165 * 3.14159265358979323846 / 180;  // of the border; the rim of cuts is before it
 // The cap's disc, as large as the corner has room for, and how far the cap reaches.

@@ -30,7 +30,7 @@ MAX_APART_M = 0.002
 CHROMIUM = ("chromium", "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
             "--hide-scrollbars", "--virtual-time-budget=20000")  # fmt: skip
 # Of a head: what is not seen from the front while the mouth is closed.
-MAY_BE_STILL = {"viseme_sil", "tongueOut"}
+MAY_BE_STILL = {"at rest", "viseme_sil", "tongueOut"}
 
 
 class Files(http.server.SimpleHTTPRequestHandler):

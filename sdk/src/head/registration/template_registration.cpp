@@ -21,6 +21,8 @@ constexpr int kFollowSweeps = 200, kLetGoSweeps = 40, kLetGoRounds = 24;
 constexpr double kLostDistance_dm = 0.01, kLostResidual_dm = 0.3;
 constexpr double kMinScale = 0.3, kMaxScale = 3;
 constexpr double kReach_dm = 16;  // no point is farther
+// Teeth and tongue are smaller than on the template: lips of fitted heads are flatter, and teeth would show through.
+constexpr double kOfMouthParts = 0.92;
 
 bool is_on_surface(TemplateKind kind) { return kind == TemplateKind::kSurface || kind == TemplateKind::kEyeFront; }
 bool is_part(TemplateKind kind) { return kind >= TemplateKind::kEye; }
@@ -270,8 +272,11 @@ class Registration {
           add(i, 1 / (1e-6 + dot(away, away) * dot(away, away)));
         }
       }
-      for (const size_t i : piece)
-        at_[i] = result_.scale * template_[i] + (weights > 0 ? (1 / weights) * shift : Vec3{});
+      const double share = head_.kinds[start] >= TemplateKind::kTeeth ? kOfMouthParts : 1;
+      for (const size_t i : piece) {
+        at_[i] =
+            result_.scale * (middle + share * (template_[i] - middle)) + (weights > 0 ? (1 / weights) * shift : Vec3{});
+      }
     }
   }
 

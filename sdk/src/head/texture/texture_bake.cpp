@@ -32,6 +32,8 @@ constexpr double kDarkestFraction = 0.2;
 // No part is darker in the photos' light than by this factor of its colour in the mean light of what they show: the
 // light on the back is a guess.
 constexpr double kMinLight = 0.85;
+// What photos show is brightened by at most 1 / this when their light is removed.
+constexpr double kMinPhotoLight = 0.25;
 
 double smooth_step(double value, double first, double whole) {
   const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
@@ -260,6 +262,22 @@ PhotoLight match_light(Texels& texels, Differences& seen) {
   return light;
 }
 
+// Removes the directional light from the mesh's colours and from what photos show.
+void even_light(const PhotoLight& light, Texels& texels, Differences& seen) {
+  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
+  for (size_t i = 0; i < seen.weights.size(); ++i) {
+    if (texels.is_surface[i] == 0 || texels.is_cap[i] != 0) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      float& own = texels.colours[3 * i + c];
+      const float before = own + seen.values[3 * i + c];
+      own = light[c].evened(own, &texels.normals[3 * i], even[c], kMinLight);
+      if (seen.weights[i] > 0) {
+        seen.values[3 * i + c] = light[c].evened(before, &texels.normals[3 * i], even[c], kMinPhotoLight) - own;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int side_px) {
@@ -288,7 +306,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   Differences seen = blend(photos, mesh, texels, side, threads);
   leave_out_collars(texels, side, seen);
   const PhotoLight light = match_light(texels, seen);
-  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
+  if (options.delight) even_light(light, texels, seen);
   std::vector<float> around(seen.values.size());
   if (earlier.side_px == 0) {
     seen = mirrored(seen, texels, side);
@@ -306,9 +324,6 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
     for (size_t c = 0; c < 3; ++c) {
       float& colour = colours[3 * i + c];
       colour = texels.colours[3 * i + c] + known * seen.values[3 * i + c] + unknown * around[3 * i + c];
-      if (options.delight && texels.is_cap[i] == 0) {
-        colour = light[c].evened(colour, &texels.normals[3 * i], even[c]);
-      }
     }
     if (texels.is_cap[i] == 0) from_photos += double(known), all += 1;
   }

@@ -15,8 +15,11 @@ namespace {
 // Points of the template head (dm) whose surroundings show the colours of skin and of hair.
 constexpr Vec3 kCheeks[2] = {{0.35, -0.85, -0.25}, {-0.35, -0.85, -0.25}};
 constexpr Vec3 kBackOfHead[2] = {{0.4, 0.95, 0.3}, {-0.4, 0.95, 0.3}};
-constexpr double kAroundFraction = 0.02;  // of the texture's side
-constexpr double kMinContrast = 25;       // between skin and hair, grey levels
+constexpr double kAroundFraction = 0.02;                // of the texture's side
+constexpr double kMinContrast = 25;                     // between skin and hair, grey levels
+constexpr double kSurelySkin = 0.3, kSurelyHair = 0.8;  // of the way from skin to hair
+// A class has its own colour as far as it is more than this share of what photos show.
+constexpr double kLittleSeen = 0.02;
 // Weights so small make fill_smoothly() take means over squares of 32 texels a side.
 constexpr float kOverSquare = 1.0f / 1024;
 // What is next to a known texel goes on from it; to 1 / e over this fraction of the side.
@@ -81,8 +84,11 @@ void add_class(const Differences& known, const Texels& texels, Share&& share, st
   const ClassMean all = mean_of_class(known, texels, share, nullptr);
   const ClassMean mean = mean_of_class(known, texels, share, &all);
   if (!(mean.weight > 0)) return;
+  double all_weight = 0;
+  for (const float weight : known.weights) all_weight += double(weight);
+  const double trust = mean.weight / (mean.weight + kLittleSeen * all_weight);
   for (size_t i = 0; i < known.weights.size(); ++i) {
-    const double of_class = double(share(i));
+    const double of_class = trust * double(share(i));
     if (of_class <= 0) continue;
     const Rgb own = {double(texels.colours[3 * i]), double(texels.colours[3 * i + 1]),
                      double(texels.colours[3 * i + 2])};
@@ -102,7 +108,8 @@ std::vector<float> hair_shares(const Texels& texels, int side) {
   for (size_t i = 0; i < shares.size(); ++i) {
     double product = 0;
     for (size_t c = 0; c < 3; ++c) product += (double(texels.colours[3 * i + c]) - skin[c]) * along[c];
-    shares[i] = float(std::clamp(product / squared, 0.0, 1.0));
+    const double t = std::clamp((product / squared - kSurelySkin) / (kSurelyHair - kSurelySkin), 0.0, 1.0);
+    shares[i] = float(t * t * (3 - 2 * t));
   }
   return shares;
 }

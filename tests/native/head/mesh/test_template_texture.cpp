@@ -64,7 +64,9 @@ TEST(TemplateTexture, TheSurfaceHasTheColoursOfItsDirection) {
     if (head.kinds[point] != TemplateKind::kSurface || p[1] > -0.3f || std::abs(p[0]) > 0.5f) continue;  // the face
     const auto place = texture_place({double(p[0]), double(p[1]), double(p[2])});
     const Rgb seen = at(image, &head.texture_coordinates[2 * vertex]);
-    right += std::abs(seen[0] - 255 * place[0]) < 12 && std::abs(seen[1] - (255 - 255 * place[1])) < 12 ? 1 : 0;
+    right += std::abs(seen[0] - 255 * double(place[0])) < 12 && std::abs(seen[1] - 255 + 255 * double(place[1])) < 12
+                 ? 1
+                 : 0;
     ++count;
   }
   EXPECT_GT(count, 500);
@@ -86,7 +88,7 @@ TEST(TemplateTexture, MouthTeethAndTongueArePaintedAsBrightAsTheFace) {
     const int of_bright = at(bright, place)[0], of_dim = at(dim, place)[0];
     ASSERT_GT(of_bright, 100);
     ASSERT_LT(of_dim, 0.75 * of_bright);
-    ASSERT_EQ(at(bright, place)[0], at(bright, place)[2]) << "in the colour that was given";
+    ASSERT_NEAR(at(bright, place)[0], at(bright, place)[2], 2) << "in the colour that was given";
   }
 }
 

@@ -180,7 +180,7 @@ TEST(TextureBake, WhatIsNotSeenLooksAsItDidBefore) {
     before.bgr.insert(before.bgr.end(), 3, i % before.side_px < before.side_px / 2 ? 30 : 200);
   maq::WorkerThreads threads(1);
   const HeadMesh mesh = ball();
-  const TextureOptions options{kSide, false, false};
+  const TextureOptions options{kSide};
   const TextureImage same = bake_texture(mesh, {}, options, threads, before);
   const Vec3 left = {0.8, -0.6, 0}, right = {-0.8, -0.6, 0};
   EXPECT_EQ(at(same, left)[0] + at(same, right)[0], 230);

@@ -81,8 +81,9 @@ class MorphTarget:
 
 
 class HeadMesh(NativeObject):
-    """The surface of a head as a mesh of V vertices and F triangles: `Head.mesh`. It ends below the chin. The animatable
-    head is open there, the dense surface closed. Arrays are copied at the first use and stay valid after `close`."""
+    """The surface of a head as a mesh of V vertices and F triangles: `Head.mesh`. It ends below the chin. The
+    animatable head is open there, the dense surface closed. Arrays are copied at the first use and stay valid
+    after `close`."""
 
     @property
     def _data(self) -> Any:

@@ -252,10 +252,10 @@ MAQ_API maq_status maq_head_scale_by_depth(const maq_head* head, uint32_t index,
 /* For maq_head_mesh_config.triangle_count: no triangle is removed. */
 #define MAQ_HEAD_ALL_TRIANGLES 0xFFFFFFFFu
 
-/* All zero is the default: an animatable head. It has the same vertices, triangles and texture coordinates for every
- * head, eyeballs, teeth and tongue, morph targets for facial actions and visemes, and in .glb files joints. It is open
- * at the neck. Hair, beards and glasses are as coarse as skin. With triangle_count or cell_m, the mesh is instead the
- * dense surface itself, closed, without morph targets. */
+/* All zero is the default: an animatable head. Its vertices, triangles and texture coordinates are the same for
+ * every head. It has eyeballs, teeth and tongue, morph targets for facial actions and visemes, and joints in .glb
+ * files. It is open at the neck. Hair, beards and glasses are as coarse as skin. With triangle_count or cell_m, the
+ * mesh is instead the dense surface itself, closed, without morph targets. */
 typedef struct maq_head_mesh_config {
   uint32_t struct_size;
   maq_model_options model; /* threads: 0 means the threads of the builder that fitted the head. A bundle is read only

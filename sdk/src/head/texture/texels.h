@@ -1,4 +1,4 @@
-// The texels that a mesh covers by its texture coordinates, and values between the pixels of images.
+// The texels that a mesh covers by its texture coordinates, values between the pixels of images, and between limits.
 #pragma once
 
 #include <algorithm>
@@ -44,6 +44,12 @@ void for_each_texel(const std::vector<float>& coordinates, const std::vector<uin
       }
     }
   }
+}
+
+// 0 up to `first`, 1 from `whole` on, and a cubic between them.
+inline double smooth_step(double value, double first, double whole) {
+  const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
 }
 
 // Bilinear, of values [height][width][channels] at a position within them; pixel centres are whole numbers.

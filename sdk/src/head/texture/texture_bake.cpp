@@ -32,13 +32,8 @@ constexpr double kDarkestFraction = 0.2;
 // No part is darker in the photos' light than by this factor of its colour in the mean light of what they show: the
 // light on the back is a guess.
 constexpr double kMinLight = 0.85;
-// What photos show is brightened by at most 1 / this when their light is removed.
+// The removal of light brightens photos by at most 1 / this.
 constexpr double kMinPhotoLight = 0.25;
-
-double smooth_step(double value, double first, double whole) {
-  const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 
 double luma(const float* rgb) { return 0.299 * double(rgb[0]) + 0.587 * double(rgb[1]) + 0.114 * double(rgb[2]); }
 
@@ -301,7 +296,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
                 " to ", kMaxTexture_px, ".");
   }
   Texels texels = draw_texels(mesh, side, threads);
-  const std::vector<float> hair = hair_shares(texels, side);
+  const std::vector<float> hair = hair_fractions(texels, side);
   if (earlier.side_px > 0) take_colours(earlier, side, texels);
   Differences seen = blend(photos, mesh, texels, side, threads);
   leave_out_collars(texels, side, seen);
@@ -310,7 +305,7 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
   std::vector<float> around(seen.values.size());
   if (earlier.side_px == 0) {
     seen = mirrored(seen, texels, side);
-    around = colours_of_classes(seen, texels, hair);
+    around = colours_of_classes(seen, texels, hair, side);
   }
   go_on_from_known(seen, side, around);
   const size_t count = texels.is_surface.size();

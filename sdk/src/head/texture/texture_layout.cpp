@@ -37,6 +37,10 @@ std::array<float, 2> texture_place(Vec3 template_point) {
   return {float(0.5 + radius * direction.x / across), float(0.5 - radius * direction.y / across)};
 }
 
+double texture_angle(double radius) {
+  return 2 * std::asin(std::clamp(radius / kDiscRadius * std::sin(kLargestAngle / 2), 0.0, 1.0));
+}
+
 bool is_in_cap_disc(float u, float v) {
   return std::hypot(double(u) - kCapMiddle, double(v) - kCapMiddle) < kCapRadius + 0.01;
 }

@@ -7,14 +7,20 @@
 
 #include "core/math/vec3.h"
 #include "head/texture/smooth_fill.h"
+#include "head/texture/texels.h"
 #include "head/texture/texture_layout.h"
 
 namespace maq::head {
 namespace {
 
-// Points of the template head (dm) whose surroundings show the colours of skin and of hair.
+// Points of the template head (dm) whose surroundings have the colours of skin and of hair.
 constexpr Vec3 kCheeks[2] = {{0.35, -0.85, -0.25}, {-0.35, -0.85, -0.25}};
-constexpr Vec3 kBackOfHead[2] = {{0.4, 0.95, 0.3}, {-0.4, 0.95, 0.3}};
+constexpr Vec3 kTopOfHead[2] = {{0.3, 0.3, 1.1}, {-0.3, 0.3, 1.1}};
+// The hairline, seen from the layout's centre: degrees from the upward direction, mean - turn * cos(a) + fold * cos(2
+// a) at the angle a from the front: 31 before, 49 over the ears, 86 behind.
+constexpr double kHairlineMean = 53.75, kHairlineTurn = 27.5, kHairlineFold = 4.75;
+constexpr double kSoftHairline = 6, kInsideHairline = 25;  // degrees
+constexpr double kDegreesOfRadian = 57.29577951308232;
 constexpr double kAroundFraction = 0.02;                // of the texture's side
 constexpr double kMinContrast = 25;                     // between skin and hair, grey levels
 constexpr double kSurelySkin = 0.3, kSurelyHair = 0.8;  // of the way from skin to hair
@@ -22,18 +28,18 @@ constexpr double kSurelySkin = 0.3, kSurelyHair = 0.8;  // of the way from skin 
 constexpr double kLittleSeen = 0.02;
 // Weights so small make fill_smoothly() take means over squares of 32 texels a side.
 constexpr float kOverSquare = 1.0f / 1024;
-// What is next to a known texel goes on from it; to 1 / e over this fraction of the side.
+// Next to known texels their values go on; to 1 / e over this fraction of the side.
 constexpr double kNearFraction = 0.06;
 // Colours that are farther than this from the mean of hair or skin hardly count for it, grey levels.
 constexpr double kOutlier = 45;
 constexpr double kDarkest = 0.75, kBrightest = 1.25;  // of a class, relative to its mean
 
-using Rgb = std::array<double, 3>;
+using Colour = std::array<double, 3>;
 
-double luma(const Rgb& rgb) { return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2]; }
+double luma_of(const Colour& rgb) { return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2]; }
 
-Rgb mean_colour_around(const Texels& texels, int side, const Vec3 (&points)[2]) {
-  Rgb sum{};
+Colour mean_colour_around(const Texels& texels, int side, const Vec3 (&points)[2]) {
+  Colour sum{};
   double count = 0;
   const int reach = std::max(1, int(kAroundFraction * side));
   for (const Vec3& point : points) {
@@ -54,7 +60,7 @@ Rgb mean_colour_around(const Texels& texels, int side, const Vec3 (&points)[2]) 
 
 // The mean colours of a class, whose share of each texel is `share(i)`: in photos, and of the mesh.
 struct ClassMean {
-  Rgb seen{}, own{};
+  Colour seen{}, own{};
   double weight = 0;
 };
 
@@ -64,7 +70,7 @@ ClassMean mean_of_class(const Differences& known, const Texels& texels, Share&& 
   for (size_t i = 0; i < known.weights.size(); ++i) {
     double weight = double(known.weights[i]) * double(share(i));
     if (weight <= 0) continue;
-    Rgb own{}, seen{};
+    Colour own{}, seen{};
     double squared = 0;
     for (size_t c = 0; c < 3; ++c) {
       own[c] = double(texels.colours[3 * i + c]), seen[c] = own[c] + double(known.values[3 * i + c]);
@@ -79,10 +85,11 @@ ClassMean mean_of_class(const Differences& known, const Texels& texels, Share&& 
 }
 
 // Adds what the class makes of each texel's difference, far from all that is known.
-template <class Share>
-void add_class(const Differences& known, const Texels& texels, Share&& share, std::vector<float>& sum) {
-  const ClassMean all = mean_of_class(known, texels, share, nullptr);
-  const ClassMean mean = mean_of_class(known, texels, share, &all);
+template <class Share, class Evidence>
+void add_class(const Differences& known, const Texels& texels, Share&& share, Evidence&& evidence,
+               std::vector<float>& sum) {
+  const ClassMean all = mean_of_class(known, texels, evidence, nullptr);
+  const ClassMean mean = mean_of_class(known, texels, evidence, &all);
   if (!(mean.weight > 0)) return;
   double all_weight = 0;
   for (const float weight : known.weights) all_weight += double(weight);
@@ -90,28 +97,38 @@ void add_class(const Differences& known, const Texels& texels, Share&& share, st
   for (size_t i = 0; i < known.weights.size(); ++i) {
     const double of_class = trust * double(share(i));
     if (of_class <= 0) continue;
-    const Rgb own = {double(texels.colours[3 * i]), double(texels.colours[3 * i + 1]),
-                     double(texels.colours[3 * i + 2])};
-    const double brightness = std::clamp(luma(own) / std::max(1.0, luma(mean.own)), kDarkest, kBrightest);
+    const Colour own = {double(texels.colours[3 * i]), double(texels.colours[3 * i + 1]),
+                        double(texels.colours[3 * i + 2])};
+    const double brightness = std::clamp(luma_of(own) / std::max(1.0, luma_of(mean.own)), kDarkest, kBrightest);
     for (size_t c = 0; c < 3; ++c) sum[3 * i + c] += float(of_class * (brightness * mean.seen[c] - own[c]));
   }
 }
 
+// Degrees within the hairline, of each texel's direction; negative outside.
+double within_hairline(size_t texel, int side) {
+  const double right = (double(texel % size_t(side)) + 0.5) / side - 0.5;
+  const double up = 0.5 - (double(texel / size_t(side)) + 0.5) / side;  // the back of the head is above
+  const double angle = texture_angle(std::hypot(right, up)) * kDegreesOfRadian, around = std::atan2(right, -up);
+  return kHairlineMean - kHairlineTurn * std::cos(around) + kHairlineFold * std::cos(2 * around) - angle;
+}
+
 }  // namespace
 
-std::vector<float> hair_shares(const Texels& texels, int side) {
-  const auto skin = mean_colour_around(texels, side, kCheeks), hair = mean_colour_around(texels, side, kBackOfHead);
-  std::vector<float> shares(texels.is_surface.size());
-  const Rgb along = {hair[0] - skin[0], hair[1] - skin[1], hair[2] - skin[2]};
+std::vector<float> hair_fractions(const Texels& texels, int side) {
+  const Colour skin = mean_colour_around(texels, side, kCheeks), hair = mean_colour_around(texels, side, kTopOfHead);
+  const Colour along = {hair[0] - skin[0], hair[1] - skin[1], hair[2] - skin[2]};
   const double squared = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
-  if (!(squared >= kMinContrast * kMinContrast)) return shares;
-  for (size_t i = 0; i < shares.size(); ++i) {
+  std::vector<float> made(texels.is_surface.size());
+  for (size_t i = 0; i < made.size(); ++i) {
     double product = 0;
     for (size_t c = 0; c < 3; ++c) product += (double(texels.colours[3 * i + c]) - skin[c]) * along[c];
-    const double t = std::clamp((product / squared - kSurelySkin) / (kSurelyHair - kSurelySkin), 0.0, 1.0);
-    shares[i] = float(t * t * (3 - 2 * t));
+    const bool differs = squared >= kMinContrast * kMinContrast;
+    const double by_colour = differs ? smooth_step(product / squared, kSurelySkin, kSurelyHair) : 0;
+    const double by_place = smooth_step(within_hairline(i, side), -kSoftHairline, kSoftHairline);
+    const double may_be_hair = differs ? smooth_step(product / squared, 0, kSurelySkin) : 1;
+    made[i] = float(std::max(by_colour, by_place * may_be_hair));
   }
-  return shares;
+  return made;
 }
 
 Differences mirrored(const Differences& known, const Texels& texels, int side) {
@@ -138,12 +155,16 @@ Differences mirrored(const Differences& known, const Texels& texels, int side) {
   return made;
 }
 
-std::vector<float> colours_of_classes(const Differences& known, const Texels& texels, const std::vector<float>& hair) {
+std::vector<float> colours_of_classes(const Differences& known, const Texels& texels, const std::vector<float>& hair,
+                                      int side) {
   std::vector<float> made(known.values.size());
-  add_class(
-      known, texels, [&](size_t i) { return 1 - hair[i]; }, made);
-  add_class(
-      known, texels, [&](size_t i) { return hair[i]; }, made);
+  const auto is_skin = [&](size_t i) { return 1 - hair[i]; };
+  const auto is_hair = [&](size_t i) { return hair[i]; };
+  const auto is_surely_hair = [&](size_t i) {
+    return hair[i] * float(smooth_step(within_hairline(i, side), 0, kInsideHairline));
+  };
+  add_class(known, texels, is_skin, is_skin, made);
+  add_class(known, texels, is_hair, is_surely_hair, made);
   return made;
 }
 

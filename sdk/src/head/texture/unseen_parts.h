@@ -1,5 +1,5 @@
-// What no photo shows of a head: mirrored from the other side, and continued from what is seen, hair from hair and skin
-// from skin.
+// Fills the parts of a head that no photo shows: mirrors the other side, and continues hair from hair and skin from
+// skin.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ struct Differences {
   std::vector<float> weights;  // [side][side]
 };
 
-// How much of each texel is hair, by where its colour lies between the colours of the face and of the back of the head;
-// all 0 where these differ little, as on a bald head.
-std::vector<float> hair_shares(const Texels& texels, int side);
+// How much of each texel is hair, 0 to 1: what is within the hairline of most heads, unless it has the colour of the
+// cheeks, and what has the colour of the top of the head. Without a difference between these the hairline decides.
+std::vector<float> hair_fractions(const Texels& texels, int side);
 
 // Fills an unknown side from the other side. A side that is known in part keeps its light: the mean difference between
 // both sides goes on from there.
@@ -28,7 +28,8 @@ Differences mirrored(const Differences& known, const Texels& texels, int side);
 
 // The differences that give each texel the mean colour that photos show of hair or of skin, as bright as the mesh's
 // colour is among these.
-std::vector<float> colours_of_classes(const Differences& known, const Texels& texels, const std::vector<float>& hair);
+std::vector<float> colours_of_classes(const Differences& known, const Texels& texels, const std::vector<float>& hair,
+                                      int side);
 
 // Makes differences go over into those of the nearest known texels, so that there is no step.
 void go_on_from_known(const Differences& known, int side, std::vector<float>& values);

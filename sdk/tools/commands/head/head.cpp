@@ -487,9 +487,8 @@ void add_mesh_options(CLI::App& command, HeadOptions& options) {
 }
 
 constexpr char kHeadFooter[] =
-    "The .glb is animatable: it has the photo as its texture, 52 facial actions and 15 visemes as morph targets, "
-    "eyes,\n"
-    "teeth, and joints of neck, head, jaw and eyes. All heads have the same vertices and texture coordinates.\n"
+    "The .glb is animatable: it has the photo as its texture, eyes, teeth, 52 facial actions and 15 visemes as morph\n"
+    "targets. Joints turn neck, head, jaw and eyes. All heads have the same vertices and texture coordinates.\n"
     "With --triangles, the mesh is instead the dense, closed surface, which shows hair and beards better.\n"
     "Lengths are in metres, with y up and the face to the front. A photo does not tell the size of a head:\n"
     "it is an average size, unless --pupils or --depth gives the size.\n"

@@ -9,7 +9,10 @@
 
 #include "head/files/prior_file.h"
 #include "head/files/template_file.h"
+#include "head/reconstruction/head_texture.h"
 #include "head/reconstruction/registered_template.h"
+#include "image/files/image_file.h"
+#include "support/expect_error.h"
 #include "support/temp_folder.h"
 
 namespace wrapped_surface_tests {
@@ -165,6 +168,38 @@ TEST(RegisteredTemplate, TheJawTurnsAsJawOpenDoes) {
     moved += std::hypot(double(open->deltas[3 * k + 1]), double(open->deltas[3 * k + 2]));
   }
   EXPECT_LT(off, 0.25 * moved);
+}
+
+TEST(RegisteredTemplate, HasTheHeadsTextureInItsOwnCoordinates) {
+  const HeadTemplate& onto = shipped_template();
+  StoredHead head = drawn_head(0.5, 9);
+  WorkerThreads threads(2);
+  TemplateRegistration registration;
+  const HeadMesh mesh = registered_template(head, onto, threads, &registration);
+  EXPECT_TRUE(texture_of_template(head, onto, mesh, registration, threads).empty()) << "the head has none";
+  TextureOptions options;
+  options.side_px = 256;
+  head.texture = make_texture(head, {}, options, threads);  // without a photo: the network's colours
+  maq::Frame texture;
+  maq::decode_image(texture_of_template(head, onto, mesh, registration, threads), "The texture", texture);
+  ASSERT_EQ(texture.image.width_px, 512);
+  double off = 0, count = 0;
+  for (size_t vertex = 0; vertex < mesh.vertex_count(); ++vertex) {
+    const size_t point = onto.vertex_points[vertex];
+    if (onto.kinds[point] != TemplateKind::kSurface || onto.points[3 * point + 1] > -0.4f) continue;
+    const auto along = [&](size_t axis) {
+      return size_t(std::min(511.0f, 512 * onto.texture_coordinates[2 * vertex + axis]));
+    };
+    const auto& plane = texture.image.planes[0];
+    const uint8_t* const bgr = plane.data + along(1) * plane.stride_bytes + 3 * along(0);
+    for (size_t c = 0; c < 3; ++c) off += std::abs(double(bgr[2 - c]) - mesh.colours[3 * vertex + c]), ++count;
+  }
+  EXPECT_LT(off / count, 10) << "grey levels, on the front";
+  head.texture.side_px = 300;  // a file that lies about its image
+  expect_error(MAQ_ERROR_UNREADABLE, "but its file says 300",
+               [&] { texture_of_template(head, onto, mesh, registration, threads); });
+  head.texture = {256, {0xFF, 0xD8, 0xFF, 0xE0, 0, 1, 2, 3}};
+  EXPECT_THROW(texture_of_template(head, onto, mesh, registration, threads), maq::Error);
 }
 
 TEST(RegisteredTemplate, VisemesAreSumsOfActions) {

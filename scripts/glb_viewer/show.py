@@ -13,6 +13,7 @@ moves nothing that is seen.
 from __future__ import annotations
 
 import argparse
+import base64
 import functools
 import html
 import http.server
@@ -84,10 +85,12 @@ def main() -> int:
         query += "&actions=" + urllib.parse.quote(options.actions)
     url = f"http://127.0.0.1:{server.server_port}/viewer.html?{query}"
     facts = facts_of(chromium(url, "--window-size=960,540", "--dump-dom"))
+    sheet = base64.b64decode(facts.pop("png", ""))
     print(f"{options.glb}: {json.dumps(facts)}")
-    if options.picture:
-        width, height = facts.get("sheet_px", (960, 540))
-        chromium(url, f"--window-size={width},{height}", f"--screenshot={options.picture.resolve()}")
+    if options.picture and options.head:
+        options.picture.write_bytes(sheet)
+    elif options.picture:
+        chromium(url, "--window-size=960,540", f"--screenshot={options.picture.resolve()}")
     server.shutdown()
     is_right = "error" not in facts and facts["people"] > 0 and facts["draw_calls"] > 0
     if options.head:

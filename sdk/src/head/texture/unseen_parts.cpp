@@ -20,10 +20,12 @@ constexpr Vec3 kTopOfHead[2] = {{0.3, 0.3, 1.1}, {-0.3, 0.3, 1.1}};
 // a) at the angle a from the front: 31 before, 49 over the ears, 86 behind.
 constexpr double kHairlineMean = 53.75, kHairlineTurn = 27.5, kHairlineFold = 4.75;
 constexpr double kSoftHairline = 6, kInsideHairline = 25;  // degrees
+// Hair hangs as far beyond it; dark skin of the neck is no hair.
+constexpr double kNearHair = 15, kFarthestHair = 50;
 constexpr double kDegreesOfRadian = 57.29577951308232;
-constexpr double kAroundFraction = 0.02;                // of the texture's side
-constexpr double kMinContrast = 25;                     // between skin and hair, grey levels
-constexpr double kSurelySkin = 0.3, kSurelyHair = 0.8;  // of the way from skin to hair
+constexpr double kAroundFraction = 0.02;                                  // of the texture's side
+constexpr double kMinContrast = 25;                                       // between skin and hair, grey levels
+constexpr double kSurelySkin = 0.3, kMaybeHair = 0.5, kSurelyHair = 0.9;  // of the way from skin to hair
 // A class has its own colour as far as it is more than this share of what photos show.
 constexpr double kLittleSeen = 0.02;
 // Weights so small make fill_smoothly() take means over squares of 32 texels a side.
@@ -32,7 +34,7 @@ constexpr float kOverSquare = 1.0f / 1024;
 constexpr double kNearFraction = 0.06;
 // Colours that are farther than this from the mean of hair or skin hardly count for it, grey levels.
 constexpr double kOutlier = 45;
-constexpr double kDarkest = 0.75, kBrightest = 1.25;  // of a class, relative to its mean
+constexpr double kDarkest = 0.85, kBrightest = 1.15;  // of a class, relative to its mean
 
 using Colour = std::array<double, 3>;
 
@@ -123,10 +125,10 @@ std::vector<float> hair_fractions(const Texels& texels, int side) {
     double product = 0;
     for (size_t c = 0; c < 3; ++c) product += (double(texels.colours[3 * i + c]) - skin[c]) * along[c];
     const bool differs = squared >= kMinContrast * kMinContrast;
-    const double by_colour = differs ? smooth_step(product / squared, kSurelySkin, kSurelyHair) : 0;
-    const double by_place = smooth_step(within_hairline(i, side), -kSoftHairline, kSoftHairline);
+    const double within = within_hairline(i, side), by_place = smooth_step(within, -kSoftHairline, kSoftHairline);
+    const double by_colour = differs ? smooth_step(product / squared, kMaybeHair, kSurelyHair) : 0;
     const double may_be_hair = differs ? smooth_step(product / squared, 0, kSurelySkin) : 1;
-    made[i] = float(std::max(by_colour, by_place * may_be_hair));
+    made[i] = float(std::max(by_colour * smooth_step(within, -kFarthestHair, -kNearHair), by_place * may_be_hair));
   }
   return made;
 }
@@ -163,7 +165,10 @@ std::vector<float> colours_of_classes(const Differences& known, const Texels& te
   const auto is_surely_hair = [&](size_t i) {
     return hair[i] * float(smooth_step(within_hairline(i, side), 0, kInsideHairline));
   };
-  add_class(known, texels, is_skin, is_skin, made);
+  const auto is_surely_skin = [&](size_t i) {
+    return (1 - hair[i]) * float(smooth_step(-within_hairline(i, side), 0, kInsideHairline));
+  };
+  add_class(known, texels, is_skin, is_surely_skin, made);
   add_class(known, texels, is_hair, is_surely_hair, made);
   return made;
 }

@@ -19,7 +19,8 @@ constexpr float kCapTolerance_dm = 0.003f;
 constexpr int kTextureQuality = 92;
 constexpr float kBeyondPhoto = 127;
 
-// Returns an image of 0 pixels if there is no texture. Throws MAQ_ERROR_UNREADABLE for another image than the head's file says.
+// Returns an image of 0 pixels if there is no texture. Throws MAQ_ERROR_UNREADABLE for another image than the head's
+// file says.
 TextureImage decoded(const StoredTexture& texture) {
   TextureImage made;
   if (texture.jpeg.empty()) return made;

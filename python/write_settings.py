@@ -38,7 +38,6 @@ SETTINGS = {
 ENUMS = {
     "PartColours": "maq_densepose_colours",
     "HeadShading": "maq_head_shading",
-    "HeadTopology": "maq_head_topology",
     "NoveltyMethod": "maq_novelty_method",
     "PredictorMethod": "maq_predictor_method",
     "SourceControl": "maq_source_control",

@@ -26,7 +26,7 @@ done
 printf '\n== maquette body tests/media/clip.mp4 --out %s/body.glb --bvh %s/body.bvh\n' "$out" "$out"
 "$maquette" body tests/media/clip.mp4 --out "$out/body.glb" --bvh "$out/body.bvh"
 
-# A head of the person in the photo with the photo as its texture, and a clip of it turning.
+# An animatable head of the person with the photo as its texture, and a clip of it turning.
 printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"
 "$maquette" head tests/media/photo.jpg --out "$out/head.glb" --preview "$out/head_turning.mp4"
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from maquette import HeadMesh
 
-from benchmarks.heads.fitted import DM_PER_M
+from benchmarks.heads.fitted import DM_PER_M, z_up
 from benchmarks.heads.other_heads import PEOPLE, load_head
 from export.camera import Camera
 from export.heads.sampling import Lamps, look_at, sample_camera, sample_extras, sample_lamps
@@ -51,8 +51,8 @@ class DrawnMesh:
                               borderMode=cv2.BORDER_REPLICATE)  # fmt: skip
             return found[:, 0].astype(np.float64)
 
-        positions = mesh.positions_m.astype(np.float64) * DM_PER_M
-        return DrawnMesh.coloured(positions, faces, mesh.normals.astype(np.float64), sampled if textured else mixed)
+        positions = z_up(mesh.positions_m) * DM_PER_M
+        return DrawnMesh.coloured(positions, faces, z_up(mesh.normals), sampled if textured else mixed)
 
     @staticmethod
     def coloured(

@@ -17,7 +17,7 @@ from maquette import Frame, HeadBuilder, MaquetteError
 from tqdm import tqdm
 
 from benchmarks.heads.drawing import DrawnMesh, framed
-from benchmarks.heads.fitted import DM_PER_M, cameras_of
+from benchmarks.heads.fitted import DM_PER_M, cameras_of, z_up
 from benchmarks.heads.mean_head import MM_PER_DM, mesh_of, template_points
 from export.camera import Camera
 from export.heads.fitting.anchor_fit import fit_anchors, observations_of
@@ -136,7 +136,7 @@ def fitted_mesh(builder: HeadBuilder, face: RealFace, seconds: float) -> PosedMe
     builder.add_photo(face.rgb, face.box)
     with builder.fit(seconds) as head:
         mesh, camera = head.mesh("all"), cameras_of(head)[0]
-    points, template = (a.astype(np.float64) * DM_PER_M for a in (mesh.positions_m, mesh.template_points_m))
+    points, template = (z_up(a) * DM_PER_M for a in (mesh.positions_m, mesh.template_points_m))
     return PosedMesh(points, template, mesh.triangles.astype(np.int64), camera)
 
 

@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
   if (failed) fprintf(stderr, "%s\n", maq_last_error(NULL));
   nose.struct_size = sizeof nose;
   if (!failed && maq_head_get_landmark(head, "nose_tip", &nose) == MAQ_OK) {
-    printf("%s: the nose ends %.0f mm before the middle of the head\n", argv[2], -1e3 * nose.point_m[1]);
+    printf("%s: the nose ends %.0f mm before the middle of the head\n", argv[2], 1e3 * nose.point_m[2]);
   }
   maq_head_mesh_destroy(mesh), maq_head_destroy(head), maq_head_builder_destroy(builder),
       maq_densepose_result_release(people);

@@ -1,7 +1,7 @@
-"""Heads: a closed, coloured 3D head in metres, from one photo of a person or from several.
+"""Heads: an animatable, textured 3D head in metres, from one photo of a person or from several.
 
 A face is biometric data: ask the person, and protect heads like passwords (docs/guide/head.md). Points of a head
-are in metres: x to the person's left, y to the back of the head, z up, the origin in its middle.
+are in metres: x to the person's left, y up, z to the front, as in glTF, the origin in the middle of the head.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from maquette.scenes import PinholeCamera, Progress
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from maquette.settings import HeadBuilderSettings, HeadRendererSettings, HeadShading, HeadTopology
+    from maquette.settings import HeadBuilderSettings, HeadRendererSettings, HeadShading
 
 _ALL_TRIANGLES = 0xFFFFFFFF  # MAQ_HEAD_ALL_TRIANGLES
 
@@ -65,9 +65,10 @@ class HeadLandmark:
 
 @dataclass(frozen=True, eq=False)
 class MorphTarget:
-    """A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1.
+    """A facial action or a viseme at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1.
 
-    name: one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's left. vertices: uint32 [N],
+    name: one of ARKit's 52 actions, such as jawOpen or eyeBlinkLeft; left is the person's left. Or one of 15 visemes
+    for speech, such as viseme_aa. vertices: uint32 [N],
     increasing; all others stay. deltas_m: float32 [N, 3].
     """
 
@@ -80,8 +81,9 @@ class MorphTarget:
 
 
 class HeadMesh(NativeObject):
-    """The surface of a head as a mesh of V vertices and F triangles: `Head.mesh`. It ends below the chin, and is closed
-    except with the template's topology. Arrays are copied at the first use and stay valid after `close`."""
+    """The surface of a head as a mesh of V vertices and F triangles: `Head.mesh`. It ends below the chin. The
+    animatable head is open there, the dense surface closed. Arrays are copied at the first use and stay valid
+    after `close`."""
 
     @property
     def _data(self) -> Any:
@@ -122,22 +124,22 @@ class HeadMesh(NativeObject):
 
     @functools.cached_property
     def texture_coordinates(self) -> np.ndarray | None:
-        """float32 [V, 2], u to the right and v down, 0 to 1. None without a texture, except with the template's
-        topology. Vertices at seams appear twice."""
+        """float32 [V, 2], u to the right and v down, 0 to 1. None of the dense surface of a head without a texture.
+        Vertices at seams appear twice."""
         if self._data.texture_coordinates == native().ffi.NULL:
             return None
         return self._copied(self._data.texture_coordinates, (self._data.vertex_count, 2), np.float32)
 
     @functools.cached_property
     def texture_jpeg(self) -> bytes | None:
-        """A square JPEG file, which `Frame.decode` reads. None without a texture, and with the template's topology."""
+        """A square JPEG file, which `Frame.decode` reads. None without a texture."""
         if self._data.texture_bytes == 0:
             return None
         return bytes(native().ffi.buffer(self._data.texture_jpeg, self._data.texture_bytes))
 
     @functools.cached_property
     def morph_targets(self) -> tuple[MorphTarget, ...]:
-        """Facial actions, with the template's topology."""
+        """Facial actions and visemes of the animatable head; none of the dense surface."""
         n, count = native(), self._data.morph_target_count
         return tuple(
             MorphTarget(
@@ -155,7 +157,7 @@ class HeadMesh(NativeObject):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh for other programs: .glb, .obj with a .mtl beside it, or .ply. GLB and OBJ have the texture,
-        GLB also the morph targets. In files x is to the person's left, y up, z to the front. Raises MaquetteError."""
+        GLB also the morph targets, and joints of neck, head, jaw and eyes. Raises MaquetteError."""
         native().call("maq_head_mesh_save", self.handle, path_to_write(path))
 
     def _about(self) -> str:
@@ -209,21 +211,22 @@ class Head(NativeObject):
         info = self.info
         return f"of {info.photo_count} photo{'' if info.photo_count == 1 else 's'}, size: {info.scale}"
 
-    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0, topology: HeadTopology = "field",
+    def mesh(self, triangle_count: int | str = 0, cell_m: float = 0,
              bundle: str | os.PathLike[str] | None = None) -> HeadMesh:  # fmt: skip
-        """Makes a mesh of the surface, in a second or less.
+        """Makes a mesh, in a second or less: the animatable head, or the dense surface.
 
-        triangle_count: about this many, 100 or more, or "all"; 0: 60,000, or all if cell_m is given. cell_m: distance
-        between neighbouring vertices of the full mesh, about, 0.0005 to 0.02; 0: 0.0021, or 0.0016 for more than 60,000
-        triangles. topology: "field", the surface itself, or "template": vertices, triangles and texture coordinates are
-        the same for every head, with facial actions; triangle_count and cell_m are then 0. bundle: folder of the bundle
-        with the template, for a head from a file; default: the installed one. Raises MaquetteError.
+        The animatable head has the same vertices, triangles and texture coordinates for every head, eyeballs, teeth and
+        tongue, facial actions and visemes, and joints in .glb files. triangle_count: the dense, closed surface instead,
+        with about this many triangles, 100 or more, or "all". cell_m: also the dense surface, with this distance
+        between neighbouring vertices before triangles are removed, 0.0005 to 0.02; 0: 0.0021, or 0.0016 for more than
+        60,000 triangles. bundle: folder of the bundle with the template head, for the animatable head of a file;
+        default: the installed one. Raises MaquetteError.
         """
         if isinstance(triangle_count, str):
             if triangle_count != "all":
                 raise ValueError(f'triangle_count is "{triangle_count}"; it is a number or "all"')
             triangle_count = _ALL_TRIANGLES
-        settings: dict[str, Any] = {"triangle_count": triangle_count, "cell_m": cell_m, "topology": topology}
+        settings: dict[str, Any] = {"triangle_count": triangle_count, "cell_m": cell_m}
         if bundle is not None:
             settings["bundle_path"] = bundle
         n = native()
@@ -274,7 +277,7 @@ class HeadBuilder(NativeObject):
 
     bundle: a folder with manifest.json (default: the one in the package). texture: whether heads get a texture with
     the photos' pixels; None: the SDK's choice, which is a texture in this version. settings: fields of
-    maq_head_builder_config by their names: threads, provider, texture_px (256 to 2048; default 1024), mirror_unseen,
+    maq_head_builder_config by their names: threads, provider, texture_px (256 to 2048; default 1024),
     delight_texture, ... The part of each photo around the head stays in memory until `clear` or `close`. Raises
     MaquetteError.
     """

@@ -8,7 +8,6 @@ from typing import Literal, TypedDict
 
 PartColours = Literal["default", "detectron2", "magicanimate"]
 HeadShading = Literal["colour", "shape", "normals", "template", "depth"]
-HeadTopology = Literal["field", "template"]
 NoveltyMethod = Literal["auto", "bigram"]
 PredictorMethod = Literal["auto", "last", "motion", "refined", "sampled"]
 SourceControl = Literal[
@@ -266,10 +265,6 @@ class HeadBuilderSettings(ModelSettings, total=False):
 
     texture_px: int
     """Pixels a side of the texture, 256 to 2048; 0: 1024. Not with "off"."""
-
-    mirror_unseen: int
-    """1: if no photo sees one side of the head, the texture of the other side is mirrored. 0: that side has the
-    network's colours."""
 
     delight_texture: int
     """1: directional light of the photos is removed from the texture, as far as it can be estimated. An app can then

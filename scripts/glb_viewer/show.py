@@ -1,15 +1,19 @@
-"""Shows a .glb file of bodies in three.js (npm, MIT) by headless Chromium, at a time of its animation.
+"""Shows a .glb file in three.js (npm, MIT) by headless Chromium: bodies at a time of their animation, or a head's
+facial actions and joints as a sheet.
 
     python scripts/glb_viewer/show.py build/glb bodies.glb --seconds 0.5 --picture bodies.png
     python scripts/glb_viewer/show.py build/glb person.glb --bvh person.bvh --seconds 0.5
+    python scripts/glb_viewer/show.py build/glb head.glb --head --picture actions.png
 
 The first argument is the folder with node_modules/three. Prints what three.js found; with --bvh also how far apart the
-joints of both files are. Fails where nothing is drawn, or joints are more than 2 mm apart.
+joints of both files are. Fails where nothing is drawn, joints are more than 2 mm apart, or an action or joint of a head
+moves nothing that is seen.
 """
 
 from __future__ import annotations
 
 import argparse
+import base64
 import functools
 import html
 import http.server
@@ -19,12 +23,16 @@ import subprocess
 import sys
 import tempfile
 import threading
+import urllib.parse
 from pathlib import Path
 
-PAGE = Path(__file__).parent / "viewer.html"
+PAGES = Path(__file__).parent
 MAX_APART_M = 0.002
+JOINTS, ACTIONS = ["Neck", "Head", "Jaw", "LeftEye", "RightEye"], 52 + 15
 CHROMIUM = ("chromium", "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-            "--hide-scrollbars", "--window-size=960,540", "--virtual-time-budget=20000")  # fmt: skip
+            "--hide-scrollbars", "--virtual-time-budget=20000")  # fmt: skip
+# A head looks the same with these: the tongue does not show while the mouth is closed.
+MAY_BE_STILL = {"at rest", "viseme_sil", "tongueOut"}
 
 
 class Files(http.server.SimpleHTTPRequestHandler):
@@ -62,21 +70,32 @@ def main() -> int:
     parser.add_argument("glb", type=Path)
     parser.add_argument("--bvh", type=Path, help="of the same person")
     parser.add_argument("--seconds", type=float, default=0.0)
+    parser.add_argument("--head", action="store_true", help="a head with facial actions and joints")
+    parser.add_argument("--actions", help="of a head: jawOpen,eyeBlinkLeft+eyeBlinkRight; default: all")
     parser.add_argument("--picture", type=Path, help="PNG")
     options = parser.parse_args()
-    files = {"/viewer.html": PAGE, "/given.glb": options.glb, "/modules/": options.modules / "node_modules"}
+    page = PAGES / ("head.html" if options.head else "viewer.html")
+    files = {"/viewer.html": page, "/given.glb": options.glb, "/modules/": options.modules / "node_modules"}
     if options.bvh:
         files["/given.bvh"] = options.bvh
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Files, files=files))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     query = f"seconds={options.seconds}" + ("&bvh=1" if options.bvh else "")
+    if options.actions:
+        query += "&actions=" + urllib.parse.quote(options.actions)
     url = f"http://127.0.0.1:{server.server_port}/viewer.html?{query}"
-    facts = facts_of(chromium(url, "--dump-dom"))
+    facts = facts_of(chromium(url, "--window-size=960,540", "--dump-dom"))
+    sheet = base64.b64decode(facts.pop("png", ""))
     print(f"{options.glb}: {json.dumps(facts)}")
-    if options.picture:
-        chromium(url, f"--screenshot={options.picture.resolve()}")
+    if options.picture and options.head:
+        options.picture.write_bytes(sheet)
+    elif options.picture:
+        chromium(url, "--window-size=960,540", f"--screenshot={options.picture.resolve()}")
     server.shutdown()
     is_right = "error" not in facts and facts["people"] > 0 and facts["draw_calls"] > 0
+    if options.head:
+        is_right = is_right and facts["has_texture"] and not set(facts["still"]) - MAY_BE_STILL
+        is_right = is_right and facts["bones"] == JOINTS and facts["actions"] == ACTIONS
     if options.bvh:
         is_right = is_right and facts["compared"] >= 19 and facts["farthest_m"] <= MAX_APART_M
     return 0 if is_right else 1

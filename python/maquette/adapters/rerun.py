@@ -50,12 +50,12 @@ def log_curves(path: str, curves: Curves) -> None:
 
 
 def log_head(path: str, mesh: HeadMesh) -> None:
-    """The mesh with its colours; z up."""
+    """The mesh with its colours; y up."""
     surface = rerun.Mesh3D(
         vertex_positions=mesh.positions_m, vertex_normals=mesh.normals, vertex_colors=mesh.colours,
         triangle_indices=mesh.triangles,
     )  # fmt: skip
-    rerun.log(path, rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    rerun.log(path, rerun.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
     rerun.log(path, surface)
 
 

@@ -1,4 +1,4 @@
-/* Heads: a closed, coloured 3D head in metres, from one photo of a person or from several.
+/* Heads: an animatable, textured 3D head in metres, from one photo of a person or from several.
  *
  *   maq_head_builder_create(context, NULL, &builder);
  *   maq_head_builder_add_photo(builder, frame, NULL);
@@ -21,9 +21,10 @@
 extern "C" {
 #endif
 
-/* The head's frame: metres, x to the person's left, y to the back, z up. Its origin is the middle of the head. The
- * template head is the SDK's standard head. Each of its points, such as the tip of the nose, has a corresponding point
- * on every head. A network, the encoder, estimates which template point each part of a photo shows. */
+/* The head's frame: metres, x to the person's left, y up, z to the front, as in glTF. Its origin is the middle of the
+ * head. The template head is the SDK's standard head. Each of its points, such as the tip of the nose, has a
+ * corresponding point on every head. A network, the encoder, estimates which template point each part of a photo shows.
+ */
 
 typedef struct maq_head_builder maq_head_builder;
 typedef struct maq_head maq_head;
@@ -46,8 +47,6 @@ typedef struct maq_head_builder_config {
                                "heads"; the installed one is share/maquette/models/heads-int8. */
   maq_head_texture texture; /* a texture of 1024 pixels a side takes 140 MB of memory and one to two seconds more */
   uint32_t texture_px;      /* pixels a side of the texture, 256 to 2048; 0: 1024. Not with MAQ_HEAD_TEXTURE_OFF. */
-  int32_t mirror_unseen;    /* 1: if no photo sees one side of the head, the texture of the other side is mirrored.
-                               0: that side has the network's colours. */
   int32_t delight_texture;  /* 1: directional light of the photos is removed from the texture, as far as it can be
                                estimated. An app can then relight the head. 0: it stays. */
   maq_progress_callback progress_callback; /* of maq_head_builder_fit; may be NULL */
@@ -250,59 +249,57 @@ MAQ_API maq_status maq_head_scale_by_depth(const maq_head* head, uint32_t index,
 
 /* ---- Meshes ---- */
 
-/* Which vertices and triangles a mesh has. */
-typedef enum maq_head_topology {
-  MAQ_HEAD_TOPOLOGY_FIELD = 0,   /* the surface itself, closed */
-  MAQ_HEAD_TOPOLOGY_TEMPLATE = 1 /* the template head, registered to the surface: the same vertices for every head, with
-                                    texture coordinates, eyeballs, teeth, tongue, and morph targets for facial actions.
-                                    It is open at the neck; beards, hair and glasses are as coarse as skin. */
-} maq_head_topology;
-
 /* For maq_head_mesh_config.triangle_count: no triangle is removed. */
 #define MAQ_HEAD_ALL_TRIANGLES 0xFFFFFFFFu
 
-/* All zero is the default. */
+/* All zero is the default: an animatable head. Its vertices, triangles and texture coordinates are the same for
+ * every head. It has eyeballs, teeth and tongue, morph targets for facial actions and visemes, and joints in .glb
+ * files. It is open at the neck. Hair, beards and glasses are as coarse as skin. With triangle_count or cell_m, the
+ * mesh is instead the dense surface itself, closed, without morph targets. */
 typedef struct maq_head_mesh_config {
   uint32_t struct_size;
-  maq_model_options model;    /* threads: 0 means the threads of the builder that fitted the head. A bundle is read only
-                                 for the template topology of a head from a file, because the file has no template. The
-                                 installed one is share/maquette/models/heads-int8. Other fields have no effect. */
-  maq_head_topology topology; /* with MAQ_HEAD_TOPOLOGY_TEMPLATE, triangle_count and cell_m must be 0 */
-  uint32_t triangle_count;    /* approximate number of triangles, 100 or more; edges are collapsed in the order of least
-                                 change. 0: 60,000, or all if cell_m is set; MAQ_HEAD_ALL_TRIANGLES: all */
-  double cell_m; /* approximate distance between neighbouring vertices before edges are collapsed, 0.0005 to 0.02.
-                    0: 0.0021, or 0.0016 for more than 60,000 triangles */
+  maq_model_options model; /* threads: 0 means the threads of the builder that fitted the head. A bundle is read only
+                              for the animatable mesh of a head from a file, because the file has no template head. The
+                              installed one is share/maquette/models/heads-int8. Other fields have no effect. */
+  uint32_t triangle_count; /* approximate number of triangles of the dense surface, 100 or more; edges are collapsed in
+                              the order of the smallest change. 0: the animatable head, or all if cell_m is set;
+                              MAQ_HEAD_ALL_TRIANGLES: all */
+  double cell_m; /* approximate distance between neighbouring vertices of the dense surface before edges are collapsed,
+                    0.0005 to 0.02. 0: 0.0021, or 0.0016 for more than 60,000 triangles */
 } maq_head_mesh_config;
 
-/* The arrays of a mesh. With MAQ_HEAD_TOPOLOGY_FIELD it is closed, without holes, and ends at a plane below the chin.
- * If it has a texture, the vertices at that plane appear twice, once for the cap. With MAQ_HEAD_TOPOLOGY_TEMPLATE,
- * vertices at texture seams appear twice. */
+/* The arrays of a mesh. The dense surface is closed, without holes, and ends at a plane below the chin. If it has a
+ * texture, the vertices at that plane appear twice, once for the cap. In the animatable head, vertices at texture seams
+ * appear twice. */
 typedef struct maq_head_mesh_data {
   uint32_t struct_size;
   uint32_t vertex_count;
   uint32_t triangle_count;
-  uint32_t morph_target_count;    /* 0 with MAQ_HEAD_TOPOLOGY_FIELD */
+  uint32_t morph_target_count;    /* 0 of the dense surface */
   const float* positions_m;       /* [vertex_count][3] */
   const float* normals;           /* [vertex_count][3], outwards, of length 1 */
   const uint8_t* colours_rgb;     /* [vertex_count][3], sRGB */
   const float* template_points_m; /* [vertex_count][3]: the point of the template head. Equal points mean the same part
                                      of every head, such as the tip of the nose. */
   const uint32_t* triangles;      /* [triangle_count][3], counter-clockwise seen from outside */
-  const float* texture_coordinates; /* [vertex_count][2]: u to the right, v down, 0 to 1. NULL without a texture, except
-                                       with MAQ_HEAD_TOPOLOGY_TEMPLATE. */
-  const uint8_t* texture_jpeg;  /* a square JPEG file: a disc, the crown in its middle, the face in its lower half; NULL
-                                   if the head has no texture, and with MAQ_HEAD_TOPOLOGY_TEMPLATE */
-  uint32_t texture_bytes;       /* size of texture_jpeg */
+  const float* texture_coordinates; /* [vertex_count][2]: u to the right, v down, 0 to 1. NULL of the dense surface of a
+                                       head without a texture. */
+  const uint8_t*
+      texture_jpeg;       /* a square JPEG file; NULL if the head has no texture. Of the dense surface it is a disc,
+                             the crown in its middle, the face in its lower half. Of the animatable head it is in
+                             the texture coordinates of MakeHuman, with twice the pixels a side, up to 2048. */
+  uint32_t texture_bytes; /* size of texture_jpeg */
   float simplification_error_m; /* largest distance between a vertex of the full mesh and this mesh; 0 if nothing was
                                    removed */
 } maq_head_mesh_data;
 
-/* A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The deltas of
- * several actions add up. Texts and arrays are the mesh's. */
+/* A facial action or a viseme at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The
+ * deltas of several actions add up. Texts and arrays are the mesh's. */
 typedef struct maq_head_morph_target {
   uint32_t struct_size;
-  uint32_t vertex_count;    /* vertices that move; all others stay */
-  const char* name;         /* one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's left */
+  uint32_t vertex_count; /* vertices that move; all others stay */
+  const char* name; /* one of ARKit's 52 actions, such as jawOpen or eyeBlinkLeft; left is the person's left. Or one of
+                       15 visemes for speech, such as viseme_aa. */
   const uint32_t* vertices; /* [vertex_count], increasing */
   const float* deltas_m;    /* [vertex_count][3] */
 } maq_head_morph_target;
@@ -314,7 +311,8 @@ MAQ_API maq_status maq_head_mesh_config_init(maq_head_mesh_config* config, uint3
 /* Creates a mesh of the head's surface. `config` may be NULL for the defaults. The mesh does not need the head
  * afterwards. The caller owns `*mesh`; give it to maq_head_mesh_destroy.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNSUPPORTED (the head has no surface, or the bundle no
- * template), MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the template's bundle), MAQ_ERROR_OUT_OF_MEMORY. Blocks
+ * template), MAQ_ERROR_UNREADABLE (the texture), MAQ_ERROR_NOT_FOUND and MAQ_ERROR_BAD_BUNDLE (the template's bundle),
+ * MAQ_ERROR_OUT_OF_MEMORY. Blocks
  * while the mesh is computed, a second or less with the defaults. */
 MAQ_API maq_status maq_head_mesh_create(const maq_head* head, const maq_head_mesh_config* config, maq_head_mesh** mesh);
 
@@ -332,9 +330,9 @@ MAQ_API maq_status maq_head_mesh_get_morph_target(const maq_head_mesh* mesh, uin
                                                   maq_head_morph_target* target);
 
 /* Writes the mesh to a file. The extension of `path`, in small letters, chooses the format: .glb (glTF 2.0), .obj with
- * a .mtl file, or .ply (binary, with template points). GLB and OBJ have the texture; GLB also has the morph targets. In
- * files, x points to the person's left, y up and z to the front, as in glTF (docs/reference/formats.md). Files appear
- * atomically and replace existing ones.
+ * a .mtl file, or .ply (binary, with template points). GLB and OBJ have the texture; GLB also has the morph targets and
+ * a skin with the joints Neck, Head, Jaw, LeftEye and RightEye (docs/reference/formats.md). Files appear atomically and
+ * replace existing ones.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT (another extension), MAQ_ERROR_UNWRITABLE. Blocks while the files are
  * written. */
 MAQ_API maq_status maq_head_mesh_save(const maq_head_mesh* mesh, const char* path);
@@ -352,7 +350,7 @@ typedef enum maq_head_shading {
   MAQ_HEAD_SHADING_COLOUR = 0,   /* the mesh's texture, or its colours if it has none; in soft light */
   MAQ_HEAD_SHADING_SHAPE = 1,    /* grey, in soft light */
   MAQ_HEAD_SHADING_NORMALS = 2,  /* red to the right, green up, blue to the camera, as in normal maps */
-  MAQ_HEAD_SHADING_TEMPLATE = 3, /* template points: red to the person's left, green to the back, blue up */
+  MAQ_HEAD_SHADING_TEMPLATE = 3, /* template points: red to the person's left, green up, blue to the front */
   MAQ_HEAD_SHADING_DEPTH = 4     /* white is near, black is far */
 } maq_head_shading;
 

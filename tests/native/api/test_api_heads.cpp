@@ -45,7 +45,7 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndLandmarks) {
   // On the prior's mean the pupils are 63.7 mm apart and the crown is at 121 mm. The encoder saw a head that is
   // narrower by 1.105 and taller by 1 / 0.895; no photo tells its size.
   const maq_head_landmark crown = head.landmark("crown"), left = head.landmark("pupil_left");
-  EXPECT_NEAR(2 * left.point_m[0] / crown.point_m[2], 63.7 / 121 * 0.895 / 1.105, 0.015);
+  EXPECT_NEAR(2 * left.point_m[0] / crown.point_m[1], 63.7 / 121 * 0.895 / 1.105, 0.015);
   // By the anchors it is 1 mm, and the photo leaves more of the depth than of the height (a fit in torch says as
   // much).
   EXPECT_NEAR(crown.sigma_m, 0.0021, 1e-4);
@@ -53,16 +53,16 @@ TEST_F(ApiHeads, APhotoBecomesAHeadWithAMeshAndLandmarks) {
   EXPECT_NEAR(left.point_m[0], -head.landmark("pupil_right").point_m[0], 1e-3);
   EXPECT_GT(left.point_m[0], 0.02) << "left is the person's";
 
-  const float crown_m = float(crown.point_m[2]);
+  const float crown_m = float(crown.point_m[1]);
   const Mesh mesh(head, of_cell(0.004));
   ASSERT_GT(mesh.vertex_count, 1000u);
   EXPECT_EQ(mesh.triangle_count, 2 * (mesh.vertex_count - 2)) << "closed, of one piece without holes";
   for (uint32_t i = 0; i < mesh.vertex_count; ++i) {
     const float *p = mesh.positions_m + 3 * i, *n = mesh.normals + 3 * i, *t = mesh.template_points_m + 3 * i;
     ASSERT_LT(std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]), 0.3f);
-    ASSERT_GE(p[2], -0.0951f) << "cut off below";
+    ASSERT_GE(p[1], -0.0951f) << "cut off below";
     ASSERT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], 1, 1e-4);
-    ASSERT_NEAR(t[2] * crown_m, p[2] * 0.121f, 1e-3f) << "on the template head the crown is at 121 mm";
+    ASSERT_NEAR(t[1] * crown_m, p[1] * 0.121f, 1e-3f) << "on the template head the crown is at 121 mm";
   }
   for (uint32_t i = 0; i < 3 * mesh.triangle_count; ++i) ASSERT_LT(mesh.triangles[i], mesh.vertex_count);
   EXPECT_GT(Mesh(head, of_cell(0.002)).vertex_count, 3 * mesh.vertex_count);
@@ -322,9 +322,13 @@ TEST_F(ApiHeads, MeshesHaveAsManyTrianglesAsAreAskedFor) {
     return mesh.triangle_count;
   };
   const uint32_t full = count(0, MAQ_HEAD_ALL_TRIANGLES);
-  EXPECT_EQ(Mesh(head).triangle_count, 60000u) << "the default";
-  EXPECT_GT(Mesh(head).simplification_error_m, 0);
-  EXPECT_LT(Mesh(head).simplification_error_m, 2e-4f);
+  maq_head_mesh_config many = maquette::default_head_mesh_config();
+  many.triangle_count = 60000;
+  const Mesh fewer(head, many);
+  EXPECT_EQ(fewer.triangle_count, 60000u);
+  EXPECT_GT(fewer.simplification_error_m, 0);
+  EXPECT_LT(fewer.simplification_error_m, 2e-4f);
+  EXPECT_EQ(Mesh(head).simplification_error_m, 0) << "the animatable head";
   EXPECT_GT(full, 60000u);
   EXPECT_EQ(count(0, 2000), 2000u);
   EXPECT_EQ(count(0.0016, 0), full) << "with a cell the default is all";

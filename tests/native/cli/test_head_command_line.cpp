@@ -51,7 +51,29 @@ TEST_F(HeadCommandLine, APhotoBecomesAMeshAndAHead) {
   EXPECT_EQ(document["photos"], 1);
   EXPECT_EQ(document["scale"], "prior");
   EXPECT_EQ(document["landmarks"].size(), 5u);
-  EXPECT_GT(document["landmarks"]["crown"]["point_m"][2], 0.08);
+  EXPECT_GT(document["landmarks"]["crown"]["point_m"][1], 0.08);
+}
+
+TEST_F(HeadCommandLine, ASavedHeadIsExportedAgainWithoutItsPhoto) {
+  ASSERT_EQ(run("grey.png --box 110,60,200,180 --save head.maqh --seconds 0").exit_code, 0);
+  const Outcome animatable = run("export head.maqh --out o/head.glb");
+  ASSERT_EQ(animatable.exit_code, 0) << animatable.err;
+  EXPECT_EQ(animatable.out, "o/head.glb: 363 vertices, 664 triangles, 2 morph targets\n");
+  const std::string file = read_text(folder_.file("o/head.glb"));
+  for (const char* text : {"jawOpen", "image/jpeg", "\"skins\"", "\"Head\""}) {
+    EXPECT_NE(file.find(text), std::string::npos) << text;
+  }
+  const Outcome dense = run("export head.maqh --out o/head.ply --triangles 500 --cell 6");
+  ASSERT_EQ(dense.exit_code, 0) << dense.err;
+  EXPECT_NE(dense.out.find(" triangles, within "), std::string::npos) << dense.out;
+  EXPECT_NE(run("head.maqh --out o/c.glb").exit_code, 0) << "it is no photo";
+  expect_error("export head.maqh", 2, "--out is required");
+  expect_error("export head.maqh --out a.stl", 2, "must end with .glb, .obj or .ply");
+  expect_error("export head.maqh --out a.glb --triangles 5", 2, "neither 100 or more");
+  expect_error("export none.maqh --out a.glb", 1, "none.maqh");
+  expect_error("export grey.png --out a.glb", 1, "grey.png");
+  expect_error("export head.maqh --out a.glb --bundle nowhere", 1, "nowhere");
+  EXPECT_FALSE(exists("a.glb"));
 }
 
 TEST_F(HeadCommandLine, PhotosAreAddedToASavedHead) {

@@ -56,7 +56,7 @@ OUT_OF_RANGE = {
     "maq_dense_cloud_create": {"threads": (65, -1)},
     "maq_scene_renderer_create": {"image_pool_size": (65,), "near_depth": (-1, NAN), "use_background": (2,)},
     "maq_pipeline_create": {"result_pool_size": (65,), "nice": (20,)},
-    "maq_head_mesh_create": {"cell_m": (-1, 1e-5, 1, NAN), "topology": (2,)},
+    "maq_head_mesh_create": {"cell_m": (-1, 1e-5, 1, NAN)},
     "maq_head_renderer_create": {
         "near_m": (-1, NAN), "shading": (9,), "shading_strength": (1.5, -0.5, NAN), "disable_antialiasing": (2,),
         "use_background": (-1,), "image_pool_size": (65,), "threads": (65,)}}  # fmt: skip
@@ -151,9 +151,7 @@ def objects(tmp_path_factory) -> SimpleNamespace:
                      release="maq_frame_release")  # fmt: skip
     n.call("maq_head_builder_add_photo", builder, plain, n.ffi.NULL)
     head = create("maq_head", builder, 0, function="maq_head_builder_fit")
-    template = n.config("maq_head_mesh_config", {})
-    template.topology = n.lib.MAQ_HEAD_TOPOLOGY_TEMPLATE
-    mesh = create("maq_head_mesh", head, template)
+    mesh = create("maq_head_mesh", head, n.ffi.NULL)
     create("maq_head_renderer", n.context, n.ffi.NULL, mesh)
     pipeline = create("maq_pipeline", n.context, n.ffi.NULL)
     n.call("maq_pipeline_set_source", pipeline, b"stub:pattern?size=16x16&frames=1")

@@ -49,9 +49,9 @@ def test_the_mesh_is_closed_and_corresponds_to_the_template_head(head):
     assert len(mesh.triangles) == 2 * (count - 2)  # one piece without holes
     assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1, abs=1e-4)
     assert (mesh.normals * mesh.positions_m).sum(1).mean() > 0.05  # outwards
-    crown_m = head.landmark("crown").point_m[2]
-    on_template_m = mesh.positions_m[:, 2] * 0.121 / crown_m  # whose crown is at 121 mm
-    assert mesh.template_points_m[:, 2] == pytest.approx(on_template_m, abs=2e-3)
+    crown_m = head.landmark("crown").point_m[1]
+    on_template_m = mesh.positions_m[:, 1] * 0.121 / crown_m  # whose crown is at 121 mm
+    assert mesh.template_points_m[:, 1] == pytest.approx(on_template_m, abs=2e-3)
     assert mesh.colours[:, 0].mean() == pytest.approx(178, abs=15)  # red, of the prior
     assert (mesh.texture_coordinates, mesh.texture_jpeg, mesh.simplification_error_m) == (None, None, 0)
 
@@ -66,8 +66,8 @@ def test_meshes_are_as_fine_as_asked_for(head):
     assert whole.positions_m.max() < 0.3  # copies: later meshes do not write over them
 
 
-def test_the_template_s_mesh_is_the_same_for_every_head_and_has_facial_actions(head, tmp_path):
-    mesh = head.mesh(topology="template")
+def test_the_animatable_head_has_the_template_s_vertices_and_facial_actions(head, tmp_path):
+    mesh = head.mesh()
     jaw, wink = mesh.morph_targets
 
     assert len(mesh.positions_m) == 14 * 25 + 1 + 12  # as tests/native/generate/make_round_heads.py has it
@@ -75,22 +75,17 @@ def test_the_template_s_mesh_is_the_same_for_every_head_and_has_facial_actions(h
     assert mesh.texture_jpeg is None
     assert (jaw.name, wink.name) == ("jawOpen", "eyeBlinkLeft")
     assert jaw.deltas_m.shape == (len(jaw.vertices), 3)
-    assert jaw.deltas_m[:, 2] == pytest.approx(-0.015, abs=0.003)
-    assert np.all(mesh.template_points_m[jaw.vertices, 2] < 0)
+    assert jaw.deltas_m[:, 1] == pytest.approx(-0.015, abs=0.003)
+    assert np.all(mesh.template_points_m[jaw.vertices, 1] < 0)
     assert np.all(np.diff(jaw.vertices.astype(int)) > 0)
     assert head.mesh(cell_m=COARSE_M).morph_targets == ()
 
     head.save(tmp_path / "a.maqh")
     opened = maquette.Head.open(tmp_path / "a.maqh")
-    again = opened.mesh(topology="template", bundle=ROUND)
+    again = opened.mesh(bundle=ROUND)
     again.save(tmp_path / "a.glb")
     assert b'"targetNames":["jawOpen","eyeBlinkLeft"]' in (tmp_path / "a.glb").read_bytes()
     np.testing.assert_array_equal(again.triangles, mesh.triangles)
-    for wrong in ({"topology": "sphere"}, {"triangle_count": "most"}):
-        with pytest.raises(ValueError, match="it is"):
-            head.mesh(**wrong)
-    with pytest.raises(maquette.MaquetteError, match="must be 0 with MAQ_HEAD_TOPOLOGY_TEMPLATE"):
-        head.mesh(cell_m=COARSE_M, topology="template")
 
 
 def test_landmarks_have_names(head):
@@ -100,7 +95,7 @@ def test_landmarks_have_names(head):
     left, right = landmarks["pupil_left"], landmarks["pupil_right"]
     assert left.point_m[0] == pytest.approx(-right.point_m[0], abs=1e-3)
     assert left.point_m[0] > 0.02  # the person's left
-    assert landmarks["nose_tip"].point_m[1] < -0.05  # the face looks to -y
+    assert landmarks["nose_tip"].point_m[2] > 0.05  # the face looks to z
     assert landmarks["crown"].sigma_m == pytest.approx(0.0021, abs=1e-4)
     assert landmarks["nose_tip"].sigma_m == pytest.approx(0.0031, abs=1e-4)  # how far it stands out is less sure
     np.testing.assert_array_equal(head.landmark("crown").point_m, landmarks["crown"].point_m)
@@ -160,7 +155,7 @@ def test_two_photos_make_one_head_with_two_cameras(builder):
     assert (near.intrinsics.width_px, far.intrinsics.width_px) == (320, 640)
     assert near.intrinsics.fx_px == pytest.approx(builder.photos[0].focal_px)
     assert near.rotation @ near.rotation.T == pytest.approx(np.eye(3), abs=1e-9)
-    assert near.centre[1] < -0.3  # before the face, metres
+    assert near.centre[2] > 0.3  # before the face, metres
     with pytest.raises(maquette.MaquetteError, match="index is 2"):
         head.camera(2)
 
@@ -297,12 +292,11 @@ def test_files_for_other_programs_have_the_triangles_asked_for(head, tmp_path, e
 
     assert read.is_watertight
     assert len(read.faces) == len(mesh.triangles)
-    x, y, z = mesh.positions_m.T
-    np.testing.assert_allclose(read.bounds, [[x.min(), z.min(), (-y).min()], [x.max(), z.max(), (-y).max()]], atol=1e-5)
+    np.testing.assert_allclose(read.bounds, [mesh.positions_m.min(0), mesh.positions_m.max(0)], atol=1e-5)
 
 
 def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
-    with maquette.HeadBuilder(ROUND, threads=1, texture_px=256, mirror_unseen=1) as builder:
+    with maquette.HeadBuilder(ROUND, threads=1, texture_px=256) as builder:
         builder.add_photo(GREY, BOX)
         head = builder.fit(0)
     mesh = head.mesh(cell_m=COARSE_M)
@@ -313,11 +307,19 @@ def test_a_texture_has_the_pixels_of_the_photo(tmp_path):
     assert mesh.texture_coordinates.shape == (len(mesh.positions_m), 2)
     assert (mesh.texture_coordinates >= 0).all()
     assert (mesh.texture_coordinates <= 1).all()
-    front = mesh.texture_coordinates[np.argmin(mesh.positions_m[:, 1])]
+    front = mesh.texture_coordinates[np.argmax(mesh.positions_m[:, 2])]
     x, y = (front * 256).astype(int)
     assert texture[y, x] == pytest.approx(GREY[0, 0], abs=6)
     head.save(tmp_path / "head.maqh")
-    assert maquette.Head.open(tmp_path / "head.maqh").mesh(cell_m=COARSE_M).texture_jpeg == mesh.texture_jpeg
+    opened = maquette.Head.open(tmp_path / "head.maqh")
+    assert opened.mesh(cell_m=COARSE_M).texture_jpeg == mesh.texture_jpeg
+
+    animatable = opened.mesh(bundle=ROUND)
+    texture = maquette.Frame.decode(animatable.texture_jpeg).pixels()
+    assert texture.shape == (512, 512, 3)
+    front = animatable.texture_coordinates[np.argmax(animatable.positions_m[:, 2])]
+    x, y = (front * 512).astype(int)
+    assert texture[y, x] == pytest.approx(GREY[0, 0], abs=6)
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ MAY_INCLUDE = {
     "head/fit": BASE - {"nn"} | {"head", "head/camera", "head/field"},
     "head/mesh": BASE - {"nn"} | {"head/camera"},
     "head/render": BASE - {"nn"} | {"head/camera", "head/mesh"},
-    "head/texture": BASE - {"nn"} | {"head/camera", "head/mesh"},
+    "head/texture": BASE - {"nn"} | {"head", "head/camera", "head/mesh"},
     "head/registration": {"core", "core/math", "head"},
     "prediction": {"core", "image"},
     "prediction/flow": {"core", "image"},

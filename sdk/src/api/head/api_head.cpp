@@ -6,6 +6,7 @@
 #include "api/head/head_handle.h"
 #include "core/worker_threads.h"
 #include "head/files/head_file.h"
+#include "head/mesh/file_axes.h"
 #include "head/reconstruction/head_scale.h"
 #include "head/reconstruction/head_surface.h"
 
@@ -89,9 +90,8 @@ maq_status maq_head_get_landmark(const maq_head* head, const char* name, maq_hea
     const double metres = head->head.scale.metres_per_unit;
     maq_head_landmark filled{};
     filled.sigma_m = float(found.sigma * metres);
-    filled.point_m[0] = found.point.x * metres;
-    filled.point_m[1] = found.point.y * metres;
-    filled.point_m[2] = found.point.z * metres;
+    const Vec3 point = metres * head::to_file_axes(found.point);
+    filled.point_m[0] = point.x, filled.point_m[1] = point.y, filled.point_m[2] = point.z;
     write_struct(landmark, "landmark", filled);
     return MAQ_OK;
   });
@@ -104,8 +104,9 @@ maq_status maq_head_get_camera(const maq_head* head, uint32_t index, maq_pinhole
     const head::HeadCamera& from = head->head.cameras[index];
     PinholeCamera made;
     made.intrinsics() = {from.width_px, from.height_px, from.focal_px, from.focal_px, from.cx_px, from.cy_px};
-    std::copy(from.head_to_camera.rotation.begin(), from.head_to_camera.rotation.end(), made.rotation.begin());
-    const Vec3 centre = head->head.scale.metres_per_unit * head::inverse(from.head_to_camera).translation;
+    made.rotation = head::rotation_from_file_axes(from.head_to_camera.rotation);
+    const Vec3 centre =
+        head->head.scale.metres_per_unit * head::to_file_axes(head::inverse(from.head_to_camera).translation);
     made.centre = {centre.x, centre.y, centre.z};
     write_struct(camera, "camera", camera_of(made));
     return MAQ_OK;

@@ -31,19 +31,19 @@ maq_head_photo default_photo() {
 head::TextureOptions texture_options(const maq_head_builder_config& config) {
   require_range("config.texture", number_in(config.texture), int32_t(MAQ_HEAD_TEXTURE_DEFAULT),
                 int32_t(MAQ_HEAD_TEXTURE_ON));
-  require_range("config.mirror_unseen", config.mirror_unseen, 0, 1);
   require_range("config.delight_texture", config.delight_texture, 0, 1);
-  head::TextureOptions options{kDefaultTexture_px, config.mirror_unseen == 1, config.delight_texture == 1};
+  head::TextureOptions options{kDefaultTexture_px, config.delight_texture == 1};
   if (config.texture_px != 0) {
     require_range("config.texture_px", config.texture_px, uint32_t(head::kMinTexture_px),
                   uint32_t(head::kMaxTexture_px));
     options.side_px = int(config.texture_px);
   }
   if (config.texture != MAQ_HEAD_TEXTURE_OFF) return options;
-  if (config.texture_px != 0 || options.mirror_unseen || options.delight) {
+  if (config.texture_px != 0 || options.delight) {
     throw ArgumentError(
-        "config.texture_px, mirror_unseen or delight_texture is set, but config.texture is MAQ_HEAD_TEXTURE_OFF; leave "
-        "them 0, or allow a texture.");
+        "config.texture_px or delight_texture is set, but config.texture is MAQ_HEAD_TEXTURE_OFF; leave them 0, or "
+        "allow "
+        "a texture.");
   }
   options.side_px = 0;
   return options;

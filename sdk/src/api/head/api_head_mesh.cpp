@@ -4,6 +4,7 @@
 #include "api/model_options.h"
 #include "core/worker_threads.h"
 #include "head/bundle/head_bundle.h"
+#include "head/mesh/file_axes.h"
 #include "head/mesh/mesh_files.h"
 #include "head/reconstruction/head_surface.h"
 #include "head/reconstruction/head_texture.h"
@@ -13,12 +14,10 @@ using namespace maq;
 
 namespace {
 
-constexpr float kDecimetre_m = 0.1f;
-constexpr uint32_t kDefaultTriangles = 60000, kMinTriangles = 100;
+constexpr uint32_t kMinTriangles = 100;
 
-std::vector<float> in_metres(std::vector<float> decimetres) {
-  for (float& value : decimetres) value *= kDecimetre_m;
-  return decimetres;
+std::vector<float> in_metres(const std::vector<float>& decimetres) {
+  return head::to_file_axes(decimetres, [](const float*) { return 0.1; });
 }
 
 maq_head_mesh_config default_mesh_config() {
@@ -33,9 +32,7 @@ head::SurfaceOptions surface_options(const maq_head_mesh_config& config) {
     require_range("config.cell_m", config.cell_m, head::kMinSurfaceCell_m, head::kMaxSurfaceCell_m);
     surface.cell_m = config.cell_m;
   }
-  if (config.triangle_count == 0) {
-    surface.triangles = config.cell_m != 0 ? head::kAllTriangles : kDefaultTriangles;
-  } else if (config.triangle_count != MAQ_HEAD_ALL_TRIANGLES) {
+  if (config.triangle_count != 0 && config.triangle_count != MAQ_HEAD_ALL_TRIANGLES) {
     require_range("config.triangle_count", config.triangle_count, kMinTriangles, MAQ_HEAD_ALL_TRIANGLES);
     surface.triangles = config.triangle_count;
   }
@@ -48,28 +45,25 @@ std::shared_ptr<const head::HeadTemplate> template_of(const maq_head& head, cons
   auto found = head::template_of_bundle(read_bundle_argument(config.model, "config.model", kHeadsBundle));
   if (found == nullptr) {
     throw Error(MAQ_ERROR_UNSUPPORTED,
-                "The bundle has no template head, so meshes cannot have its topology. Use a bundle of this version of "
-                "Maquette, or MAQ_HEAD_TOPOLOGY_FIELD.");
+                "The bundle has no template head, so there is no animatable mesh. Use a bundle of this version of "
+                "Maquette, or give config.triangle_count for the dense surface.");
   }
   return found;
 }
 
 std::unique_ptr<maq_head_mesh> mesh_of(const maq_head& head, const maq_head_mesh_config& config) {
   require_model_options("config.model", config.model, ThreadMeasuring::kUnsupported);
-  const int32_t topology = number_in(config.topology);
-  require_range("config.topology", topology, int32_t(MAQ_HEAD_TOPOLOGY_FIELD), int32_t(MAQ_HEAD_TOPOLOGY_TEMPLATE));
+  const head::SurfaceOptions surface = surface_options(config);
   WorkerThreads threads(config.model.threads != 0 ? config.model.threads : head.threads);
   auto made = std::make_unique<maq_head_mesh>();
-  if (topology == MAQ_HEAD_TOPOLOGY_TEMPLATE) {
-    if (config.cell_m != 0 || config.triangle_count != 0) {
-      throw ArgumentError(
-          "config.cell_m and config.triangle_count must be 0 with MAQ_HEAD_TOPOLOGY_TEMPLATE, whose triangles are "
-          "fixed.");
-    }
-    made->mesh = head::registered_template(head.head, *template_of(head, config), threads);
+  if (config.triangle_count == 0 && config.cell_m == 0) {
+    const auto onto = template_of(head, config);
+    head::TemplateRegistration registration;
+    made->mesh = head::registered_template(head.head, *onto, threads, &registration);
+    made->texture_jpeg = head::texture_of_template(head.head, *onto, made->mesh, registration, threads);
   } else {
     head::SurfaceStats stats;
-    made->mesh = head::head_surface(head.head, surface_options(config), threads, &stats);
+    made->mesh = head::head_surface(head.head, surface, threads, &stats);
     made->simplification_error_m = float(stats.error_m);
     if (head.head.texture.side_px > 0) {
       head::set_texture_coordinates(head.head, made->mesh);
@@ -77,6 +71,7 @@ std::unique_ptr<maq_head_mesh> mesh_of(const maq_head& head, const maq_head_mesh
     }
   }
   made->positions_m = in_metres(made->mesh.positions);
+  made->normals = head::normals_in_file(made->mesh);
   made->template_points_m = in_metres(made->mesh.template_points);
   for (const head::MorphTarget& target : made->mesh.morph_targets) {
     made->morph_deltas_m.push_back(in_metres(target.deltas));
@@ -110,7 +105,7 @@ maq_status maq_head_mesh_get_data(const maq_head_mesh* mesh, maq_head_mesh_data*
     filled.triangle_count = uint32_t(from.triangle_count());
     filled.morph_target_count = uint32_t(from.morph_targets.size());
     filled.positions_m = mesh->positions_m.data();
-    filled.normals = from.normals.data();
+    filled.normals = mesh->normals.data();
     filled.colours_rgb = from.colours.data();
     filled.template_points_m = mesh->template_points_m.data();
     filled.triangles = from.triangles.data();

@@ -24,9 +24,10 @@ struct maq_head : maq::HandleOf<maq::HandleKind::kHead> {
 };
 
 struct maq_head_mesh : maq::HandleOf<maq::HandleKind::kHeadMesh> {
-  maq::head::HeadMesh mesh;                           // in decimetres
-  std::vector<uint8_t> texture_jpeg;                  // may be empty
-  std::vector<float> positions_m, template_points_m;  // of the mesh
-  std::vector<std::vector<float>> morph_deltas_m;     // of its morph targets
+  maq::head::HeadMesh mesh;           // in decimetres
+  std::vector<uint8_t> texture_jpeg;  // may be empty
+  // Arrays of the mesh and its morph targets in the app's frame (file_axes.h).
+  std::vector<float> positions_m, normals, template_points_m;
+  std::vector<std::vector<float>> morph_deltas_m;
   float simplification_error_m = 0;
 };

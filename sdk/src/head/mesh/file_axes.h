@@ -1,15 +1,23 @@
-// The common properties of mesh files: metres, y up, z to the front; and the format of their textures.
+// The frame of mesh files and of apps: metres, x to the person's left, y up, z to the front; and the format of
+// textures.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "core/math/rotation.h"
 #include "head/mesh/head_mesh.h"
 
 namespace maq::head {
 
-// (x, y, z) of the head frame is (x, z, -y) in files.
+// (x, y, z) of the head frame is (x, z, -y) in files and for apps.
+inline Vec3 to_file_axes(Vec3 p) { return {p.x, p.z, -p.y}; }
+inline Vec3 from_file_axes(Vec3 p) { return {p.x, -p.z, p.y}; }
+
+// The rotation of a camera from the head frame, as a rotation from file axes.
+inline Mat3 rotation_from_file_axes(const Mat3& r) { return {r[0], r[2], -r[1], r[3], r[5], -r[4], r[6], r[8], -r[7]}; }
+
 template <class ScaleOf>
 std::vector<float> to_file_axes(const std::vector<float>& from, ScaleOf&& scale_of) {
   std::vector<float> made(from.size());

@@ -1,6 +1,7 @@
 // A triangle mesh in the head frame: decimetres, x to the person's left, y to the back, z up.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -15,6 +16,19 @@ struct MorphTarget {
   std::vector<float> deltas;       // [vertices][3], decimetres
 };
 
+// A part that turns with its children: neck, head, jaw, eyes.
+struct MeshJoint {
+  std::string name;               // letters, digits and _
+  int parent = -1;                // an earlier joint; -1: none
+  std::array<float, 3> position;  // decimetres
+};
+
+// The joints that move a vertex, and by which shares; the sum is 1. Unused ones are joint 0 with the weight 0.
+struct VertexJoints {
+  std::array<uint8_t, 4> joints;
+  std::array<float, 4> weights;
+};
+
 // An empty array is unknown. Arrays of floats and bytes are by vertex.
 struct HeadMesh {
   std::vector<float> positions;            // x, y, z, decimetres
@@ -23,7 +37,9 @@ struct HeadMesh {
   std::vector<float> template_points;      // x, y, z on the template head, decimetres
   std::vector<float> texture_coordinates;  // u to the right, v down, 0 to 1
   std::vector<uint32_t> triangles;         // three vertices each, counter-clockwise seen from outside
-  std::vector<MorphTarget> morph_targets;  // of the template head alone
+  std::vector<MorphTarget> morph_targets;  // of the template head alone, like what follows
+  std::vector<MeshJoint> joints;           // the first has no parent
+  std::vector<VertexJoints> vertex_joints;
 
   size_t vertex_count() const { return positions.size() / 3; }
   size_t triangle_count() const { return triangles.size() / 3; }

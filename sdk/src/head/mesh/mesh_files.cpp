@@ -29,6 +29,25 @@ void check_numbers(const std::vector<float>& values, size_t each, const char* wh
               ", which no file can hold. Check the field that it was made from.");
 }
 
+void check_joints(const HeadMesh& mesh) {
+  bool is_right = mesh.vertex_joints.size() == (mesh.joints.empty() ? 0 : mesh.vertex_count());
+  for (size_t i = 0; i < mesh.joints.size(); ++i) {
+    const MeshJoint& joint = mesh.joints[i];
+    is_right = is_right && joint.parent < int(i) && (joint.parent < 0) == (i == 0) &&
+               std::all_of(joint.position.begin(), joint.position.end(), [](float p) { return std::isfinite(p); });
+  }
+  for (const VertexJoints& vertex : mesh.vertex_joints) {
+    for (size_t k = 0; k < 4; ++k) {
+      is_right = is_right && vertex.joints[k] < mesh.joints.size() && vertex.weights[k] >= 0 && vertex.weights[k] <= 1;
+    }
+  }
+  if (is_right) return;
+  throw Error(
+      MAQ_ERROR_INVALID_ARGUMENT,
+      "The joints of the mesh are not one tree at finite positions, or do not fit its vertices. Give each vertex "
+      "joints that there are, and weights of 0 to 1.");
+}
+
 void check_mesh(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
   const size_t count = mesh.vertex_count();
   if (count == 0 || mesh.triangles.empty()) {
@@ -60,6 +79,7 @@ void check_mesh(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
     }
     check_numbers(target.deltas, 3, "a morph target");
   }
+  check_joints(mesh);
   if (texture.empty()) return;
   if (!is_jpeg(texture) && !is_png(texture)) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "The mesh's texture of ", texture.size(),

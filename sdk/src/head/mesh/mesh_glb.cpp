@@ -35,6 +35,55 @@ std::vector<uint8_t> linear_colours(const std::vector<uint8_t>& colours) {
   return made;
 }
 
+std::vector<float> joint_positions(const HeadMesh& mesh) {
+  std::vector<float> positions;
+  for (const MeshJoint& joint : mesh.joints) {
+    positions.insert(positions.end(), joint.position.begin(), joint.position.end());
+  }
+  return to_file_axes(positions, [](const float*) { return 0.1; });
+}
+
+// The attributes of vertices that joints move, and the skin, whose first joint is node 1.
+std::array<std::string, 2> add_skin(const HeadMesh& mesh, const std::vector<float>& places, GlbWriter& glb) {
+  std::vector<uint8_t> joints;
+  std::vector<float> weights, inverse;  // the inverse of each joint's place, column by column
+  for (const VertexJoints& vertex : mesh.vertex_joints) {
+    joints.insert(joints.end(), vertex.joints.begin(), vertex.joints.end());
+    weights.insert(weights.end(), vertex.weights.begin(), vertex.weights.end());
+  }
+  std::string nodes;
+  for (size_t i = 0; i < mesh.joints.size(); ++i) {
+    for (size_t k = 0; k < 12; ++k) inverse.push_back(k % 5 == 0 ? 1.0f : 0.0f);
+    for (size_t axis = 0; axis < 3; ++axis) inverse.push_back(0.0f - places[3 * i + axis]);
+    inverse.push_back(1);
+    nodes += concatenate(i == 0 ? "" : ",", i + 1);
+  }
+  const size_t at_joints = glb.add_accessor(joints, 4, GlbComponent::kUnsignedByte, GlbTarget::kVertices, "", true);
+  const size_t at_weights = glb.add_accessor(weights, 4, GlbComponent::kFloat, GlbTarget::kVertices);
+  const size_t matrices = glb.add_accessor(inverse, 16, GlbComponent::kFloat, GlbTarget::kNone);
+  return {concatenate(",\"JOINTS_0\":", at_joints, ",\"WEIGHTS_0\":", at_weights),
+          concatenate(",\"skins\":[{\"inverseBindMatrices\":", matrices, ",\"skeleton\":1,\"joints\":[", nodes, "]}]")};
+}
+
+// The nodes of joints, from node 1 on.
+std::string joint_nodes(const HeadMesh& mesh, const std::vector<float>& places) {
+  std::string nodes;
+  for (size_t i = 0; i < mesh.joints.size(); ++i) {
+    std::array<float, 3> from_parent = {places[3 * i], places[3 * i + 1], places[3 * i + 2]};
+    if (const int parent = mesh.joints[i].parent; parent >= 0) {
+      for (size_t axis = 0; axis < 3; ++axis) from_parent[axis] -= places[3 * size_t(parent) + axis];
+    }
+    std::string children;
+    for (size_t k = i + 1; k < mesh.joints.size(); ++k) {
+      if (mesh.joints[k].parent == int(i)) children += concatenate(children.empty() ? "" : ",", k + 1);
+    }
+    nodes +=
+        concatenate(",{\"name\":\"", mesh.joints[i].name, "\",\"translation\":", glb_numbers(from_parent.data(), 3),
+                    children.empty() ? "" : ",\"children\":[" + children + ']', '}');
+  }
+  return nodes;
+}
+
 }  // namespace
 
 std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t>& texture) {
@@ -57,6 +106,14 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
   } else if (!mesh.colours.empty()) {
     attributes += concatenate(",\"COLOR_0\":", glb.add_accessor(linear_colours(mesh.colours), 4,
                                                                 GlbComponent::kUnsignedByte, GlbTarget::kVertices));
+  }
+  std::string skin, nodes = "{\"name\":\"head\",\"mesh\":0}";
+  if (!mesh.joints.empty()) {
+    const std::vector<float> places = joint_positions(mesh);
+    const auto [of_vertices, of_file_skin] = add_skin(mesh, places, glb);
+    attributes += of_vertices;
+    skin = of_file_skin;
+    nodes = "{\"name\":\"head\",\"mesh\":0,\"skin\":0}" + joint_nodes(mesh, places);
   }
   std::string targets, names;
   for (const MorphTarget& target : mesh.morph_targets) {
@@ -85,8 +142,8 @@ std::vector<uint8_t> mesh_as_glb(const HeadMesh& mesh, const std::vector<uint8_t
                   ",\"materials\":[{\"name\":\"head\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,1],"
                   "\"metallicFactor\":0,\"roughnessFactor\":0.75",
                   of_material, "}}],\"meshes\":[{\"name\":\"head\",\"primitives\":[{\"attributes\":{", attributes,
-                  "},\"indices\":", indices, ",\"material\":0", of_primitive, "}]", of_mesh,
-                  "}],\"nodes\":[{\"name\":\"head\",\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}],\"scene\":0"));
+                  "},\"indices\":", indices, ",\"material\":0", of_primitive, "}]", of_mesh, "}]", skin, ",\"nodes\":[",
+                  nodes, "],\"scenes\":[{\"nodes\":[0", mesh.joints.empty() ? "" : ",1", "]}],\"scene\":0"));
 }
 
 }  // namespace maq::head

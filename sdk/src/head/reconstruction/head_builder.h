@@ -47,7 +47,7 @@ class HeadBuilder {
  public:
   // `texture`: heads get one, unless its side is 0. Throws the errors of HeadBundle and HeadEncoder.
   HeadBuilder(const std::shared_ptr<const OnnxRuntimeLibrary>& runtime, Bundle bundle, const SessionSettings& settings,
-              const TextureOptions& texture = {0, false});
+              const TextureOptions& texture = {0});
   HeadBuilder(const HeadBuilder&) = delete;
   HeadBuilder& operator=(const HeadBuilder&) = delete;
 

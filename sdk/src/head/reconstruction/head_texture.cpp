@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
 #include "head/mesh/mesh_cleanup.h"
 #include "head/reconstruction/head_surface.h"
+#include "head/texture/template_texture.h"
 #include "head/texture/texture_layout.h"
 #include "image/files/image_file.h"
 #include "image/files/jpeg.h"
@@ -16,6 +18,36 @@ constexpr double kBakedCell_m = 0.002;
 constexpr float kCapTolerance_dm = 0.003f;
 constexpr int kTextureQuality = 92;
 constexpr float kBeyondPhoto = 127;
+
+// Returns an image of 0 pixels if there is no texture. Throws MAQ_ERROR_UNREADABLE for another image than the head's
+// file says.
+TextureImage decoded(const StoredTexture& texture) {
+  TextureImage made;
+  if (texture.jpeg.empty()) return made;
+  Frame frame;
+  decode_image(texture.jpeg, "The head's texture", frame);
+  const ImageView& picture = frame.image;
+  if (picture.format != MAQ_PIXEL_BGR8 || picture.width_px != texture.side_px || picture.height_px != texture.side_px) {
+    throw Error(MAQ_ERROR_UNREADABLE, "The head's texture has ", picture.width_px, " x ", picture.height_px,
+                " pixels, but its file says ", texture.side_px, " a side in colour. Fit the head again.");
+  }
+  made.side_px = picture.width_px;
+  for (int row = 0; row < picture.height_px; ++row) {
+    const uint8_t* const from = picture.planes[0].data + size_t(row) * picture.planes[0].stride_bytes;
+    made.bgr.insert(made.bgr.end(), from, from + 3 * size_t(picture.width_px));
+  }
+  return made;
+}
+
+std::vector<uint8_t> encoded(const TextureImage& image) {
+  ImageView view;
+  view.format = MAQ_PIXEL_BGR8;
+  view.width_px = view.height_px = image.side_px;
+  view.planes[0] = {image.bgr.data(), size_t(image.side_px) * 3};
+  std::vector<uint8_t> jpeg;
+  JpegEncoder().encode(view, kTextureQuality, jpeg);
+  return jpeg;
+}
 
 }  // namespace
 
@@ -62,28 +94,15 @@ StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSour
     for (const HeadCell& cell : source.seen->cells) photo.matte.push_back(float(cell.matte));
     given.push_back(std::move(photo));
   }
-  TextureImage before;
-  if (!earlier.jpeg.empty()) {
-    Frame decoded;
-    decode_image(earlier.jpeg, "The head's texture", decoded);
-    const ImageView& picture = decoded.image;
-    if (picture.format == MAQ_PIXEL_BGR8 && picture.width_px == picture.height_px) {
-      before.side_px = picture.width_px;
-      for (int row = 0; row < picture.height_px; ++row) {
-        const uint8_t* const from = picture.planes[0].data + size_t(row) * picture.planes[0].stride_bytes;
-        before.bgr.insert(before.bgr.end(), from, from + 3 * size_t(picture.width_px));
-      }
-    }
-  }
-  const TextureImage image = bake_texture(mesh, given, options, threads, before);
-  ImageView view;
-  view.format = MAQ_PIXEL_BGR8;
-  view.width_px = view.height_px = image.side_px;
-  view.planes[0] = {image.bgr.data(), size_t(image.side_px) * 3};
-  StoredTexture made;
-  made.side_px = image.side_px;
-  JpegEncoder().encode(view, kTextureQuality, made.jpeg);
-  return made;
+  const TextureImage image = bake_texture(mesh, given, options, threads, decoded(earlier));
+  return {image.side_px, encoded(image)};
+}
+
+std::vector<uint8_t> texture_of_template(const StoredHead& head, const HeadTemplate& onto, const HeadMesh& mesh,
+                                         const TemplateRegistration& registration, WorkerThreads& threads) {
+  const TextureImage own = decoded(head.texture);
+  if (own.side_px == 0) return {};
+  return encoded(texture_on_template(own, onto, registration.template_points, mesh.colours, threads));
 }
 
 }  // namespace maq::head

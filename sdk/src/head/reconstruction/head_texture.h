@@ -7,7 +7,9 @@
 #include "core/worker_threads.h"
 #include "head/bundle/head_encoder.h"
 #include "head/fit/observations.h"
+#include "head/head_template.h"
 #include "head/mesh/head_mesh.h"
+#include "head/registration/template_registration.h"
 #include "head/stored_head.h"
 #include "head/texture/texture_bake.h"
 
@@ -33,6 +35,11 @@ struct TextureSource {
 // none. Throws the errors of head_surface(), decode_image() and JpegEncoder.
 StoredTexture make_texture(const StoredHead& head, const std::vector<TextureSource>& photos,
                            const TextureOptions& options, WorkerThreads& threads, const StoredTexture& earlier = {});
+
+// A JPEG file of the head's texture in the coordinates of its registered template (registered_template.h); empty if the
+// head has none. Throws the errors of decode_image() and JpegEncoder.
+std::vector<uint8_t> texture_of_template(const StoredHead& head, const HeadTemplate& onto, const HeadMesh& mesh,
+                                         const TemplateRegistration& registration, WorkerThreads& threads);
 
 // Sets the texture coordinates of a mesh of the head (head_surface).
 void set_texture_coordinates(const StoredHead& head, HeadMesh& mesh);

@@ -9,6 +9,8 @@
 #include "head/field/field_engine.h"
 #include "head/mesh/mesh_cleanup.h"
 #include "head/reconstruction/head_surface.h"
+#include "head/registration/template_joints.h"
+#include "head/registration/visemes.h"
 
 namespace maq::head {
 namespace {
@@ -54,6 +56,22 @@ MorphTarget morph_target(const HeadTemplate& onto, const FacialAction& action, d
     }
   }
   return made;
+}
+
+void set_joints(const TemplateJoints& joints, const HeadTemplate& onto, double to_decimetres, HeadMesh& mesh) {
+  for (const TemplateJoint& joint : joints.joints) {
+    const Vec3 p = to_decimetres * joint.position;
+    mesh.joints.push_back({joint.name, joint.parent, {float(p.x), float(p.y), float(p.z)}});
+  }
+  for (const uint32_t point : onto.vertex_points) {
+    VertexJoints made{};
+    size_t used = 0;
+    for (size_t joint = 0; joint < joints.joints.size(); ++joint) {
+      const float weight = joints.weights[point][joint];
+      if (weight > 0) made.joints[used] = uint8_t(joint), made.weights[used++] = weight;
+    }
+    mesh.vertex_joints.push_back(made);
+  }
 }
 
 }  // namespace
@@ -108,6 +126,10 @@ HeadMesh registered_template(const StoredHead& head, const HeadTemplate& onto, W
   for (const FacialAction& action : onto.actions) {
     mesh.morph_targets.push_back(morph_target(onto, action, registered.scale * to_decimetres));
   }
+  for (const FacialAction& viseme : visemes_of(onto)) {
+    mesh.morph_targets.push_back(morph_target(onto, viseme, registered.scale * to_decimetres));
+  }
+  set_joints(template_joints(onto, registered), onto, to_decimetres, mesh);
   if (registration != nullptr) *registration = std::move(registered);
   return mesh;
 }

@@ -1,5 +1,5 @@
-// The surface of a fitted head as the template's mesh: its vertices, triangles and texture coordinates, with facial
-// actions as morph targets.
+// The surface of a fitted head as the template's mesh: its vertices, triangles and texture coordinates, with joints,
+// and facial actions and visemes as morph targets.
 #pragma once
 
 #include "core/worker_threads.h"

@@ -21,6 +21,8 @@ constexpr int kFollowSweeps = 200, kLetGoSweeps = 40, kLetGoRounds = 24;
 constexpr double kLostDistance_dm = 0.01, kLostResidual_dm = 0.3;
 constexpr double kMinScale = 0.3, kMaxScale = 3;
 constexpr double kReach_dm = 16;  // no point is farther
+// Teeth and tongue are smaller than on the template: lips of fitted heads are flatter, and teeth would show through.
+constexpr double kOfMouthParts = 0.92;
 
 bool is_on_surface(TemplateKind kind) { return kind == TemplateKind::kSurface || kind == TemplateKind::kEyeFront; }
 bool is_part(TemplateKind kind) { return kind >= TemplateKind::kEye; }
@@ -270,16 +272,24 @@ class Registration {
           add(i, 1 / (1e-6 + dot(away, away) * dot(away, away)));
         }
       }
-      for (const size_t i : piece)
-        at_[i] = result_.scale * template_[i] + (weights > 0 ? (1 / weights) * shift : Vec3{});
+      const double share = head_.kinds[start] >= TemplateKind::kTeeth ? kOfMouthParts : 1;
+      for (const size_t i : piece) {
+        at_[i] =
+            result_.scale * (middle + share * (template_[i] - middle)) + (weights > 0 ? (1 / weights) * shift : Vec3{});
+      }
     }
   }
 
   void measure() {
     evaluate_field();
     result_.colours.resize(3 * count_);
+    result_.template_points = head_.points;
     for (size_t i = 0; i < count_; ++i) {
-      for (size_t c = 0; c < 3; ++c) result_.colours[3 * i + c] = values_[(7 + c) * count_ + i];
+      const bool is_found = is_on_surface(head_.kinds[i]) && length(residual(i)) <= kLostResidual_dm;
+      for (size_t c = 0; c < 3; ++c) {
+        result_.colours[3 * i + c] = values_[(7 + c) * count_ + i];
+        if (is_found) result_.template_points[3 * i + c] = values_[(4 + c) * count_ + i];
+      }
     }
     size_t count = 0;
     for (const size_t i : surface_) {

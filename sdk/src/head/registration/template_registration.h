@@ -18,7 +18,10 @@ inline constexpr size_t kRegistrationValues = 10;
 struct TemplateRegistration {
   std::vector<float> points;   // [points of the template][3], dm, in the head's frame; finite
   std::vector<float> colours;  // [points][3]: of the field, logits
-  double scale = 1;            // of the face by the template's: how much larger actions move
+  // [points][3], dm: the field's template point at each point on the surface, where it is near the wanted one; else the
+  // wanted one.
+  std::vector<float> template_points;
+  double scale = 1;  // of the face by the template's: how much larger actions move
   // For the points on the surface, in dm: distances from the surface, and residuals between the field's template point
   // there and the wanted one.
   double mean_distance = 0, max_distance = 0, mean_residual = 0, max_residual = 0;

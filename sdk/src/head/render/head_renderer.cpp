@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/frame.h"
+#include "head/mesh/file_axes.h"
 
 namespace maq::head {
 namespace {
@@ -36,8 +37,10 @@ HeadCamera camera_of(const PinholeCamera& from) {
 HeadRenderer::HeadRenderer(HeadMesh mesh, std::optional<MeshTexture> texture, const HeadRenderOptions& options)
     : mesh_(std::move(mesh)), texture_(std::move(texture)), options_(options), threads_(options.threads) {
   if (mesh_.triangles.empty()) throw Error(MAQ_ERROR_UNSUPPORTED, "The head has no surface that could be drawn.");
-  for (float& value : mesh_.positions) value *= kMetresPerDecimetre;
-  for (float& value : mesh_.template_points) value *= kMetresPerDecimetre;
+  const auto scale = [](const float*) { return double(kMetresPerDecimetre); };
+  mesh_.positions = to_file_axes(mesh_.positions, scale);
+  mesh_.normals = normals_in_file(mesh_);
+  mesh_.template_points = to_file_axes(mesh_.template_points, scale);
   Vec3 low = vertex(mesh_, 0), high = low;
   for (size_t i = 1; i < mesh_.vertex_count(); ++i) {
     const Vec3 p = vertex(mesh_, i);
@@ -95,7 +98,7 @@ PinholeCamera HeadRenderer::orbit_camera(double yaw_rad, double pitch_rad, int w
   camera.cx_px = (width_px - 1) / 2.0, camera.cy_px = (height_px - 1) / 2.0;
   const double sin_yaw = std::sin(yaw_rad), cos_yaw = std::cos(yaw_rad);
   const double sin_pitch = std::sin(pitch_rad), cos_pitch = std::cos(pitch_rad);
-  const Vec3 away{sin_yaw * cos_pitch, -cos_yaw * cos_pitch, sin_pitch}, right{cos_yaw, sin_yaw, 0};
+  const Vec3 away{sin_yaw * cos_pitch, sin_pitch, cos_yaw * cos_pitch}, right{cos_yaw, 0, -sin_yaw};
   const Vec3 forward = -away, down = cross(forward, right);
   camera.rotation = {right.x, right.y, right.z, down.x, down.y, down.z, forward.x, forward.y, forward.z};
   const Vec3 centre = middle_ + (kOrbitMargin * radius_ / std::sin(kOrbitHalfView_rad)) * away;

@@ -31,7 +31,8 @@ class HeadRenderer {
 
   void set_shading(MeshShading shading) { options_.shading = shading; }
 
-  // The world is the head's frame in metres, as are the image's lengths. Throws the errors of check_camera().
+  // The world is the head in metres, y up, z to the front (file_axes.h), as are the image's lengths. Throws the errors
+  // of check_camera().
   void render(const PinholeCamera& camera, RenderedImage& image);
 
   // A camera that sees the whole head, whichever way it is turned, 30 degrees wide along the image's shorter side.
@@ -42,7 +43,7 @@ class HeadRenderer {
  private:
   void lay_over_background(RenderedImage& image);
 
-  HeadMesh mesh_;  // metres
+  HeadMesh mesh_;  // metres, y up
   std::optional<MeshTexture> texture_;
   Vec3 middle_;
   double radius_ = 0;

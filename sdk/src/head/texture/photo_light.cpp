@@ -16,7 +16,6 @@ constexpr double kGainVariance = 200, kDirectedVariance = 700;
 // Fixes the scale of an offset, no more: the weight of 100 grey levels of it.
 constexpr double kOffsetVariance = 1e-3, kOffsetUnit = 100;
 constexpr double kMaxPlainGain = 2;
-constexpr double kMinRelativeStrength = 0.25;
 
 using Terms = std::array<double, kUnknowns>;
 
@@ -35,9 +34,9 @@ float ChannelLight::operator()(float own, const float* normal) const {
   return float(std::clamp(strength(normal) * double(own) + offset, 0.0, 255.0));
 }
 
-float ChannelLight::evened(float seen, const float* normal, double even) const {
+float ChannelLight::evened(float seen, const float* normal, double even, double darkest) const {
   if (!(even > 0)) return seen;
-  const double factor = even / std::max(strength(normal), kMinRelativeStrength * even);
+  const double factor = even / std::max(strength(normal), darkest * even);
   return float(std::clamp((double(seen) - offset) * factor + offset, 0.0, 255.0));
 }
 

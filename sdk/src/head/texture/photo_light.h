@@ -18,9 +18,9 @@ struct ChannelLight {
   float operator()(float own, const float* normal) const;  // within 0 to 255
   double strength(const float* normal) const;              // factor of own colours
 
-  // The colour `seen` if the light had this strength everywhere; within 0 to 255. Where hardly any light falls, the
-  // strength is unknown and counts as a quarter of `even`.
-  float evened(float seen, const float* normal, double even) const;
+  // The colour `seen` if the light had the strength `even` everywhere; within 0 to 255. Where hardly any light falls,
+  // the strength is unknown and counts as `darkest` of `even`.
+  float evened(float seen, const float* normal, double even, double darkest) const;
 };
 
 using PhotoLight = std::array<ChannelLight, 3>;

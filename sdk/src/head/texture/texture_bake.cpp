@@ -9,12 +9,13 @@
 #include "head/mesh/mesh_raster.h"
 #include "head/texture/photo_light.h"
 #include "head/texture/smooth_fill.h"
+#include "head/texture/texels.h"
 #include "head/texture/texture_layout.h"
+#include "head/texture/unseen_parts.h"
 
 namespace maq::head {
 namespace {
 
-constexpr int kRowsOfTask = 16;
 // From the first cosine between normal and view on a photo counts, from the second wholly.
 constexpr double kFirstCosine = 0.2, kWholeCosine = 0.65;
 // From the first share of head on in the matte a photo counts, from the second wholly.
@@ -22,85 +23,43 @@ constexpr double kFirstMatte = 0.6, kWholeMatte = 0.95;
 // A surface is hidden when another is before it by more: decimetres.
 constexpr double kHiddenBehind_dm = 0.06;
 constexpr int kMargin_px = 2;  // of a photo's square
-// Differences of photos fade with the distance from the visible part: to 1 / e over this fraction of the texture's
-// side. Found on validation heads: new views are best at 0.4 to 1.
-constexpr double kFadeFraction = 0.4;
-// Dark differences at the edge are mostly shadows and gaps in the hair: from the first luma on (grey levels) they fade
-// sooner, from the second wholly, to 1 / e over a third of that distance.
-constexpr double kFirstDark = 0, kWholeDark = 20;
 // The front of the neck is this far from the texture's middle, in sides. There a photo often shows a collar or the
-// shadow of the chin: from the first luma below the photos' mean on its pixels count less, from the second not at all.
+// shadow of the chin: from the first luma off the photos' mean on its pixels count less, from the second not at all.
 constexpr double kNeckFraction = 0.43, kFirstCollar = 35, kWholeCollar = 70;
 // The light is known for the mesh's colours that photos show. Colours darker than all but this fraction of these keep
 // their hue: they are scaled as the darkest that is known.
 constexpr double kDarkestFraction = 0.2;
 // No part is darker in the photos' light than by this factor of its colour in the mean light of what they show: the
 // light on the back is a guess.
-constexpr double kMinLight = 0.6;
-
-double smooth_step(double value, double first, double whole) {
-  const double t = std::clamp((value - first) / (whole - first), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
-
-// The surface of each texel; row by row.
-struct Texels {
-  std::vector<float> positions, normals, colours;  // [side][side][3]
-  std::vector<uint8_t> is_surface, is_cap;         // [side][side]
-};
+constexpr double kMinLight = 0.85;
+// The removal of light brightens photos by at most 1 / this.
+constexpr double kMinPhotoLight = 0.25;
 
 double luma(const float* rgb) { return 0.299 * double(rgb[0]) + 0.587 * double(rgb[1]) + 0.114 * double(rgb[2]); }
 
-struct Differences {
-  std::vector<float> values;   // [side][side][3]: photo less mesh, 0 to 255
-  std::vector<float> weights;  // [side][side]
-};
-
 void draw_texel_rows(const HeadMesh& mesh, int side, int first_row, int end_row, Texels& texels,
                      std::vector<float>& outermost) {
-  const auto corner = [&](uint32_t vertex, size_t axis) {
-    return double(mesh.texture_coordinates[2 * size_t(vertex) + axis]) * side - 0.5;
-  };
-  for (size_t i = 0; i < mesh.triangle_count(); ++i) {
-    const uint32_t* const t = &mesh.triangles[3 * i];
-    const double x[3] = {corner(t[0], 0), corner(t[1], 0), corner(t[2], 0)};
-    const double y[3] = {corner(t[0], 1), corner(t[1], 1), corner(t[2], 1)};
-    const int top = std::max(first_row, int(std::ceil(std::min({y[0], y[1], y[2]}))));
-    const int bottom = std::min(end_row - 1, int(std::floor(std::max({y[0], y[1], y[2]}))));
-    if (top > bottom) continue;
-    const int left = std::max(0, int(std::ceil(std::min({x[0], x[1], x[2]}))));
-    const int right = std::min(side - 1, int(std::floor(std::max({x[0], x[1], x[2]}))));
-    const double area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
-    if (area == 0) continue;
-    for (int row = top; row <= bottom; ++row) {
-      for (int column = left; column <= right; ++column) {
-        double shares[3];
-        shares[0] = ((x[1] - column) * (y[2] - row) - (x[2] - column) * (y[1] - row)) / area;
-        shares[1] = ((x[2] - column) * (y[0] - row) - (x[0] - column) * (y[2] - row)) / area;
-        shares[2] = 1 - shares[0] - shares[1];
-        if (shares[0] < 0 || shares[1] < 0 || shares[2] < 0) continue;
-        const auto between = [&](const auto& values, size_t axis) {
-          double sum = 0;
-          for (size_t k = 0; k < 3; ++k) sum += shares[k] * double(values[3 * size_t(t[k]) + axis]);
-          return float(sum);
-        };
-        const size_t texel = size_t(row) * size_t(side) + size_t(column);
-        float squared = 0;
-        for (size_t axis = 0; axis < 3; ++axis) {
-          const float value = between(mesh.positions, axis);
-          squared += value * value;
-        }
-        if (texels.is_surface[texel] != 0 && squared <= outermost[texel]) continue;
-        outermost[texel] = squared;
-        texels.is_surface[texel] = 1;
-        for (size_t axis = 0; axis < 3; ++axis) {
-          texels.positions[3 * texel + axis] = between(mesh.positions, axis);
-          texels.normals[3 * texel + axis] = between(mesh.normals, axis);
-          texels.colours[3 * texel + axis] = between(mesh.colours, axis);
-        }
-      }
+  const auto draw = [&](size_t texel, const uint32_t* t, const double* shares) {
+    const auto between = [&](const auto& values, size_t axis) {
+      double sum = 0;
+      for (size_t k = 0; k < 3; ++k) sum += shares[k] * double(values[3 * size_t(t[k]) + axis]);
+      return float(sum);
+    };
+    float squared = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float value = between(mesh.positions, axis);
+      squared += value * value;
     }
-  }
+    if (texels.is_surface[texel] != 0 && squared <= outermost[texel]) return;
+    outermost[texel] = squared;
+    texels.is_surface[texel] = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      texels.positions[3 * texel + axis] = between(mesh.positions, axis);
+      texels.normals[3 * texel + axis] = between(mesh.normals, axis);
+      texels.colours[3 * texel + axis] = between(mesh.colours, axis);
+    }
+  };
+  for_each_texel(mesh.texture_coordinates, mesh.triangles, side, first_row, end_row, draw);
 }
 
 Texels draw_texels(const HeadMesh& mesh, int side, WorkerThreads& threads) {
@@ -109,9 +68,9 @@ Texels draw_texels(const HeadMesh& mesh, int side, WorkerThreads& threads) {
   for (auto* values : {&texels.positions, &texels.normals, &texels.colours}) values->resize(3 * count);
   texels.is_surface.resize(count), texels.is_cap.resize(count);
   std::vector<float> outermost(count);
-  threads.run(size_t(side + kRowsOfTask - 1) / kRowsOfTask, [&](size_t task, int) {
-    const int first = int(task) * kRowsOfTask;
-    draw_texel_rows(mesh, side, first, std::min(side, first + kRowsOfTask), texels, outermost);
+  threads.run(size_t(side + kTexelRowsOfTask - 1) / kTexelRowsOfTask, [&](size_t task, int) {
+    const int first = int(task) * kTexelRowsOfTask;
+    draw_texel_rows(mesh, side, first, std::min(side, first + kTexelRowsOfTask), texels, outermost);
   });
   for (int row = 0; row < side; ++row) {
     for (int column = 0; column < side; ++column) {
@@ -120,24 +79,6 @@ Texels draw_texels(const HeadMesh& mesh, int side, WorkerThreads& threads) {
     }
   }
   return texels;
-}
-
-// Bilinear, of values [height][width][channels] at a place within them; pixel centres are whole numbers.
-template <class T, size_t kChannels>
-std::array<double, kChannels> between_pixels(const std::vector<T>& values, int width, int height, double x, double y) {
-  x = std::clamp(x, 0.0, width - 1.0), y = std::clamp(y, 0.0, height - 1.0);
-  const int left = std::min(int(x), std::max(0, width - 2)), top = std::min(int(y), std::max(0, height - 2));
-  const double along = x - left, down = y - top;
-  std::array<double, kChannels> made{};
-  for (int j = 0; j < 2; ++j) {
-    for (int i = 0; i < 2; ++i) {
-      const int column = std::min(left + i, width - 1), row = std::min(top + j, height - 1);
-      const double share = (i == 0 ? 1 - along : along) * (j == 0 ? 1 - down : down);
-      const size_t at = (size_t(row) * size_t(width) + size_t(column)) * kChannels;
-      for (size_t c = 0; c < kChannels; ++c) made[c] += share * double(values[at + c]);
-    }
-  }
-  return made;
 }
 
 // Replaces the mesh's colours by the colours of a texture of any size.
@@ -246,23 +187,6 @@ Differences blend(const std::vector<TexturePhoto>& photos, const HeadMesh& mesh,
   return all;
 }
 
-// Fills an unknown side from the other side.
-Differences mirrored(const Differences& known, const Texels& texels, int side) {
-  Differences made = known;
-  for (size_t row = 0; row < size_t(side); ++row) {
-    for (size_t column = 0; column < size_t(side); ++column) {
-      const size_t at = row * size_t(side) + column, from = row * size_t(side) + size_t(side) - 1 - column;
-      const float own = known.weights[at], other = (1 - own) * known.weights[from];
-      if (other <= 0 || texels.is_surface[at] == 0 || texels.is_cap[at] != 0) continue;
-      for (size_t c = 0; c < 3; ++c) {
-        made.values[3 * at + c] = (own * known.values[3 * at + c] + other * known.values[3 * from + c]) / (own + other);
-      }
-      made.weights[at] = own + other;
-    }
-  }
-  return made;
-}
-
 void leave_out_collars(const Texels& texels, int side, Differences& seen) {
   double sum = 0, weight = 0;
   for (size_t i = 0; i < seen.weights.size(); ++i) {
@@ -274,7 +198,8 @@ void leave_out_collars(const Texels& texels, int side, Differences& seen) {
     if (seen.weights[i] <= 0 || texels.is_cap[i] != 0) continue;
     const size_t row = i / size_t(side), column = i % size_t(side);
     if (std::hypot(double(row) + 0.5 - 0.5 * side, double(column) + 0.5 - 0.5 * side) < kNeckFraction * side) continue;
-    seen.weights[i] *= float(1 - smooth_step(sum / weight - luma(&seen.values[3 * i]), kFirstCollar, kWholeCollar));
+    const double off = std::abs(luma(&seen.values[3 * i]) - sum / weight);
+    seen.weights[i] *= float(1 - smooth_step(off, kFirstCollar, kWholeCollar));
   }
 }
 
@@ -332,6 +257,22 @@ PhotoLight match_light(Texels& texels, Differences& seen) {
   return light;
 }
 
+// Removes the directional light from the mesh's colours and from what photos show.
+void even_light(const PhotoLight& light, Texels& texels, Differences& seen) {
+  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
+  for (size_t i = 0; i < seen.weights.size(); ++i) {
+    if (texels.is_surface[i] == 0 || texels.is_cap[i] != 0) continue;
+    for (size_t c = 0; c < 3; ++c) {
+      float& own = texels.colours[3 * i + c];
+      const float before = own + seen.values[3 * i + c];
+      own = light[c].evened(own, &texels.normals[3 * i], even[c], kMinLight);
+      if (seen.weights[i] > 0) {
+        seen.values[3 * i + c] = light[c].evened(before, &texels.normals[3 * i], even[c], kMinPhotoLight) - own;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int side_px) {
@@ -355,15 +296,18 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
                 " to ", kMaxTexture_px, ".");
   }
   Texels texels = draw_texels(mesh, side, threads);
+  const std::vector<float> hair = hair_fractions(texels, side);
   if (earlier.side_px > 0) take_colours(earlier, side, texels);
   Differences seen = blend(photos, mesh, texels, side, threads);
   leave_out_collars(texels, side, seen);
   const PhotoLight light = match_light(texels, seen);
-  const std::array<double, 3> even = mean_strength(light, texels, seen.weights);
-  if (options.mirror_unseen) seen = mirrored(seen, texels, side);
-  std::vector<float> around = seen.values;
-  fill_smoothly(side, seen.weights, around);
-  const std::vector<float> distances = distance_to_known(side, seen.weights);
+  if (options.delight) even_light(light, texels, seen);
+  std::vector<float> around(seen.values.size());
+  if (earlier.side_px == 0) {
+    seen = mirrored(seen, texels, side);
+    around = colours_of_classes(seen, texels, hair, side);
+  }
+  go_on_from_known(seen, side, around);
   const size_t count = texels.is_surface.size();
   std::vector<float> colours(3 * count), is_known(count);
   double from_photos = 0, all = 0;
@@ -371,16 +315,10 @@ TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>&
     if (texels.is_surface[i] == 0) continue;
     is_known[i] = 1;
     const float known = seen.weights[i];
-    double fade = texels.is_cap[i] != 0 ? 0 : std::exp(-double(distances[i]) / (kFadeFraction * double(side)));
-    const double dark = smooth_step(-luma(&around[3 * i]), kFirstDark, kWholeDark);
-    if (dark > 0) fade += dark * (fade * fade * fade - fade);
+    const float unknown = texels.is_cap[i] != 0 ? 0 : 1 - known;
     for (size_t c = 0; c < 3; ++c) {
       float& colour = colours[3 * i + c];
-      colour =
-          texels.colours[3 * i + c] + known * seen.values[3 * i + c] + (1 - known) * float(fade) * around[3 * i + c];
-      if (options.delight && texels.is_cap[i] == 0) {
-        colour = light[c].evened(colour, &texels.normals[3 * i], even[c]);
-      }
+      colour = texels.colours[3 * i + c] + known * seen.values[3 * i + c] + unknown * around[3 * i + c];
     }
     if (texels.is_cap[i] == 0) from_photos += double(known), all += 1;
   }

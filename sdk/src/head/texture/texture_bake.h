@@ -27,8 +27,7 @@ HeadCamera crop_camera(const HeadCamera& camera, const AffineMap& to_crop, int s
 
 struct TextureOptions {
   int side_px = 1024;
-  bool mirror_unseen = false;  // a side that no photo sees gets the mirrored texture of the other side
-  bool delight = false;        // directional light is removed; the rest is as strong as on the seen surface
+  bool delight = false;  // directional light is removed; the rest is as strong as on the seen surface
 };
 
 struct TextureImage {
@@ -40,11 +39,11 @@ struct TextureImage {
 // `mesh` has normals, colours and texture coordinates (texture_layout.h). A texel shows the outermost surface that lies
 // there. A photo counts for it as far as the surface faces it, no other part of the mesh is before it, and the matte
 // says that it is the head; finer photos more. Differences between photos and the mesh's colours are blended; their
-// mean is made the same for all photos. Parts that no photo shows have the mesh's colours in the photos' light
-// (photo_light.h), plus the remaining difference of their surroundings, which fades with the distance, a dark one
-// sooner: there is no step. On the neck, pixels far darker than elsewhere do not count: they show a collar. The same
-// for any number of threads. `earlier`: texture of the head before these photos, of any size; its colours replace the
-// mesh's. Of 0 pixels: there is none.
+// mean is made the same for all photos. Parts that no photo shows mirror the other side; else they have the mean colour
+// of hair or skin in the photos (unseen_parts.h), and go over into what is seen without a step. On the neck, pixels far
+// darker or brighter than elsewhere do not count: they show a collar. The same for any number of threads. `earlier`:
+// texture of the head before these photos, of any size; its colours stay where these photos show nothing. Of 0 pixels:
+// there is none.
 TextureImage bake_texture(const HeadMesh& mesh, const std::vector<TexturePhoto>& photos, const TextureOptions& options,
                           WorkerThreads& threads, const TextureImage& earlier = {});
 

@@ -7,7 +7,6 @@
 namespace maq::head {
 namespace {
 
-constexpr Vec3 kLayoutCentre{0, 0, -0.6};  // dm, of the template head: from there least of the surface is hidden
 constexpr double kDiscRadius = 0.485;
 constexpr double kLargestAngle = 165 * 3.14159265358979323846 / 180;  // of the border; the rim of cuts is before it
 // The cap's disc, as large as the corner has room for, and how far the cap reaches.
@@ -36,6 +35,10 @@ std::array<float, 2> texture_place(Vec3 template_point) {
   const double radius = kDiscRadius * std::min(1.0, std::sin(angle / 2) / std::sin(kLargestAngle / 2));
   if (!(across > 0)) return {0.5f, 0.5f};
   return {float(0.5 + radius * direction.x / across), float(0.5 - radius * direction.y / across)};
+}
+
+double texture_angle(double radius) {
+  return 2 * std::asin(std::clamp(radius / kDiscRadius * std::sin(kLargestAngle / 2), 0.0, 1.0));
 }
 
 bool is_in_cap_disc(float u, float v) {

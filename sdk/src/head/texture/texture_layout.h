@@ -16,8 +16,14 @@
 
 namespace maq::head {
 
+// The point of the template head (dm) from which directions are mapped: it sees most of the surface.
+inline constexpr Vec3 kLayoutCentre{0, 0, -0.6};
+
 // (u, v) of a point of the template head in decimetres: u to the right, v down, within 0 to 1.
 std::array<float, 2> texture_place(Vec3 template_point);
+
+// The angle between the upward direction and the directions that lie so far from the middle of the disc, in radians.
+double texture_angle(double radius);
 
 // Whether the position is in the cap.
 bool is_in_cap_disc(float u, float v);

@@ -40,11 +40,9 @@ struct HeadOptions {
   float focal_px = 0;
   double pupils_mm = 0;
   std::string depth;  // a source, or "photo": the depth that came with the photo
-  double cell_mm = 0;
   uint32_t texture_px = 1024;
-  bool no_texture = false, mirror_unseen = false, delight = false;
-  std::string triangles;  // empty: the library's default
-  std::string topology = "field";
+  bool no_texture = false, delight = false;
+  MeshChoice mesh;
   std::string densepose;
   NetworkOptions network;
   bool json = false;
@@ -254,7 +252,7 @@ void print_result(const HeadOptions& options, const UsedPhotos& photos, const Ta
     if (!task.preview.empty()) document["preview"] = task.preview;
     if (mesh != nullptr) {
       document["vertices"] = mesh->vertex_count, document["triangles"] = mesh->triangle_count;
-      if (mesh->morph_target_count > 0) document["facial_actions"] = mesh->morph_target_count;
+      if (mesh->morph_target_count > 0) document["morph_targets"] = mesh->morph_target_count;
       document["simplification_error_mm"] = std::round(1e6 * double(mesh->simplification_error_m)) / 1e3;
     }
     document["scale"] = name_of_scale(info.scale);
@@ -277,27 +275,9 @@ void print_result(const HeadOptions& options, const UsedPhotos& photos, const Ta
   if (pupils_m > 0) print_output("; pupils %.0f mm apart", 1e3 * pupils_m);
   print_output("\n  find people %.0f | encode %.0f | pose %.0f | fit %.0f (%d steps) | mesh and files %.0f ms\n",
                stages.find_ms, stages.encode_ms, stages.pose_ms, stages.fit_ms, stats.step_count, stages.mesh_ms);
-  if (mesh != nullptr) {
-    print_output("%s: %u vertices, %u triangles", task.out.c_str(), mesh->vertex_count, mesh->triangle_count);
-    if (mesh->simplification_error_m > 0) {
-      print_output(", within %.2f mm of the full mesh", 1e3 * double(mesh->simplification_error_m));
-    }
-    if (mesh->morph_target_count > 0) print_output(", %u facial actions", mesh->morph_target_count);
-    print_output("\n");
-  }
+  if (mesh != nullptr) print_output("%s", text_of_mesh(task.out, *mesh).c_str());
   if (!task.save.empty()) print_output("%s: the head itself; see `maquette head info`\n", task.save.c_str());
   print_output("%s", of_preview.c_str());
-}
-
-maq_head_mesh_config mesh_config(const HeadOptions& options) {
-  maq_head_mesh_config mesh = maquette::default_head_mesh_config();
-  mesh.cell_m = options.cell_mm * 1e-3;
-  mesh.topology = topology_of(options.topology);
-  if (options.triangles == "all")
-    mesh.triangle_count = MAQ_HEAD_ALL_TRIANGLES;
-  else if (!options.triangles.empty())
-    mesh.triangle_count = uint32_t(std::stoul(options.triangles));
-  return mesh;
 }
 
 // Scales the head as the options say.
@@ -352,7 +332,7 @@ void fit_one(const HeadOptions& options, const maquette::Context& context, const
   stages.pose_ms = double(stats.pose_ms), stages.fit_ms = double(stats.fit_ms);
   timer.lap_ms();
   std::optional<maquette::HeadMesh> mesh;
-  if (!task.out.empty() || !task.preview.empty()) mesh.emplace(head, mesh_config(options));
+  if (!task.out.empty() || !task.preview.empty()) mesh.emplace(head, mesh_config(options.mesh));
   if (!task.out.empty()) mesh->save(task.out);
   if (!task.save.empty()) head.save(task.save);
   stages.mesh_ms = timer.lap_ms();
@@ -390,7 +370,6 @@ maq_head_builder_config builder_config(const HeadOptions& options, const std::st
   config.model.provider = provider_of(options.network);
   config.texture = options.no_texture ? MAQ_HEAD_TEXTURE_OFF : MAQ_HEAD_TEXTURE_ON;
   config.texture_px = options.no_texture ? 0 : options.texture_px;
-  config.mirror_unseen = options.mirror_unseen ? 1 : 0;
   config.delight_texture = options.delight ? 1 : 0;
   config.progress_callback = FitProgress::show;
   config.progress_user_data = &progress;
@@ -435,20 +414,9 @@ int run_head(const HeadOptions& options) {
   return failed == 0 && !interrupted() ? 0 : 1;
 }
 
-std::string check_mesh_name(const std::string& path) {
-  const std::string ending = fs::u8path(path).extension().string();
-  return ending == ".glb" || ending == ".obj" || ending == ".ply" ? std::string()
-                                                                  : path + " must end with .glb, .obj or .ply";
-}
-
 std::string check_person(const std::string& text) {
   const CLI::Range person(1, 255);
   return text == "all" || person(text).empty() ? std::string() : text + " is neither 1 to 255 nor \"all\"";
-}
-
-std::string check_triangles(const std::string& text) {
-  const CLI::Range triangles(100u, MAQ_HEAD_ALL_TRIANGLES - 1);
-  return text == "all" || triangles(text).empty() ? std::string() : text + " is neither 100 or more nor \"all\"";
 }
 
 void add_photo_options(CLI::App& command, HeadOptions& options) {
@@ -477,8 +445,7 @@ void add_photo_options(CLI::App& command, HeadOptions& options) {
 }
 
 void add_output_options(CLI::App& command, HeadOptions& options) {
-  command.add_option("-o,--out", options.out, "Mesh to write: .glb (for most programs), .obj or .ply")
-      ->check(CLI::Validator(check_mesh_name, ".glb, .obj or .ply"));
+  add_mesh_file_option(command, options.out);
   command.add_option("--save", options.save, "Also write the head itself, some 64 KB: head.maqh");
   command.add_option("--preview", options.preview, "Also write a clip of the head turning, turn.mp4, or an image")
       ->check(CLI::Validator(check_head_view_name, ".mp4, .png or .jpg"));
@@ -504,19 +471,7 @@ void add_fit_options(CLI::App& command, HeadOptions& options) {
 }
 
 void add_mesh_options(CLI::App& command, HeadOptions& options) {
-  CLI::Option* const triangles =
-      command
-          .add_option("--triangles", options.triangles,
-                      "Approximate number of triangles (default 60000, or all with --cell), or all; 2000 to 50000 suit "
-                      "games and phones")
-          ->check(CLI::Validator(check_triangles, "100 or more, or all"));
-  CLI::Option* const cell =
-      command
-          .add_option(
-              "--cell", options.cell_mm,
-              "Distance between vertices of the full mesh, mm (default 2.1, or 1.6 for more than 60000 triangles)")
-          ->check(CLI::Range(0.5, 20.0));
-  add_topology_option(command, options.topology)->excludes(triangles)->excludes(cell);
+  add_mesh_choice(command, options.mesh);
   CLI::Option* const no_texture =
       command.add_flag("--no-texture", options.no_texture,
                        "Give the head only the network's colours, blurred eyes included: no part of a photo is in it");
@@ -526,18 +481,17 @@ void add_mesh_options(CLI::App& command, HeadOptions& options) {
       ->check(CLI::Range(256u, 2048u))
       ->excludes(no_texture);
   command
-      .add_flag("--mirror-unseen", options.mirror_unseen,
-                "If no photo sees one side of the head, mirror the texture of the other side")
-      ->excludes(no_texture);
-  command
       .add_flag("--delight", options.delight,
                 "Remove directional light of the photos from the texture, for programs that relight it")
       ->excludes(no_texture);
 }
 
 constexpr char kHeadFooter[] =
-    "The mesh is closed, coloured and in metres, with y up and the face to the front. It ends below the chin. A photo\n"
-    "does not tell the size of a head: it is an average size, unless --pupils or --depth gives the size.\n"
+    "The .glb is animatable: it has the photo as its texture, eyes, teeth, 52 facial actions and 15 visemes as morph\n"
+    "targets. Joints turn neck, head, jaw and eyes. All heads have the same vertices and texture coordinates.\n"
+    "With --triangles, the mesh is instead the dense, closed surface, which shows hair and beards better.\n"
+    "Lengths are in metres, with y up and the face to the front. A photo does not tell the size of a head:\n"
+    "it is an average size, unless --pupils or --depth gives the size.\n"
     "Parts that no photo shows, such as the back of the head, follow from similar heads. More photos of the same\n"
     "person, from the sides, help; each may have another camera. Faces should be 64 pixels or more across.\n\n"
     "A face is biometric data: ask the person. Nothing leaves this machine. A saved head holds pixels of\n"
@@ -551,8 +505,9 @@ constexpr char kHeadFooter[] =
     "  maquette head portrait.png --out head.obj --box 120,40,380,390 --focal-px 900\n"
     "  maquette head photo.jpg --out head.glb --pupils 63\n"
     "  maquette head photo.jpg --out head.glb --no-texture\n"
-    "  maquette head photo.jpg --out avatar.glb --topology template\n"
+    "  maquette head photo.jpg --out surface.ply --triangles 60000\n"
     "  maquette head photo.jpg --out head.glb --preview turn.mp4\n"
+    "  maquette head export head.maqh --out head.obj --triangles 5000\n"
     "  maquette head render head.maqh --out view.png --yaw 30\n"
     "  maquette head info head.maqh";
 
@@ -573,6 +528,7 @@ void add_head_command(CLI::App& app, int* exit_code) {
   command->footer(kHeadFooter);
   command->require_subcommand(0, 1);
   add_head_info_command(*command, exit_code);
+  add_head_export_command(*command, exit_code);
   add_head_render_command(*command, exit_code);
   command->callback([=] {
     if (!command->get_subcommands().empty()) return;

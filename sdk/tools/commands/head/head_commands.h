@@ -10,6 +10,7 @@ class App;
 class Option;
 }  // namespace CLI
 
+void add_head_export_command(CLI::App& head, int* exit_code);
 void add_head_info_command(CLI::App& head, int* exit_code);
 void add_head_render_command(CLI::App& head, int* exit_code);
 
@@ -19,9 +20,23 @@ const char* name_of_scale(maq_head_scale scale);
 // "the average of heads, +- 4 %".
 std::string text_of_scale(const maq_head_info& info);
 
-// --topology field|template.
-CLI::Option* add_topology_option(CLI::App& command, std::string& topology);
-maq_head_topology topology_of(const std::string& name);
+// The mesh to make: the animatable head, or the dense surface by --triangles and --cell.
+struct MeshChoice {
+  std::string triangles;  // a number or "all"; empty: not given
+  double cell_mm = 0;
+};
+void add_mesh_choice(CLI::App& command, MeshChoice& choice);
+maq_head_mesh_config mesh_config(const MeshChoice& choice);
+
+// --bundle with the template head, for a head from a file; its folder, empty for the dense surface.
+void add_template_bundle_option(CLI::App& command, std::string& bundle);
+std::string bundle_of_mesh(const maq_head_mesh_config& mesh, const std::string& named);
+
+// --out of a mesh.
+CLI::Option* add_mesh_file_option(CLI::App& command, std::string& path);
+
+// "head.glb: 5027 vertices, 9432 triangles, …" and a line break.
+std::string text_of_mesh(const std::string& path, const maq_head_mesh_data& mesh);
 
 // The view of a head in an image or a clip.
 struct HeadView {

@@ -20,13 +20,12 @@ struct HeadInfoOptions {
 
 // Counts of the template's mesh; 0 if the default bundle has no template.
 struct TemplateFacts {
-  uint32_t vertices = 0, triangles = 0, actions = 0;
+  uint32_t vertices = 0, triangles = 0, morph_targets = 0;
 };
 
 TemplateFacts template_facts(const maquette::Head& head, const std::string& named) {
   const std::string bundle = named.empty() ? default_bundle(kHeadsNetworks) : named;
   maq_head_mesh_config config = maquette::default_head_mesh_config();
-  config.topology = MAQ_HEAD_TOPOLOGY_TEMPLATE;
   if (!bundle.empty()) config.model.bundle_path = bundle.c_str();
   try {
     const maquette::HeadMesh made(head, config);
@@ -57,7 +56,7 @@ int show_head(const HeadInfoOptions& options) {
                                     {"template",
                                      {{"vertices", of_template.vertices},
                                       {"triangles", of_template.triangles},
-                                      {"facial_actions", of_template.actions}}},
+                                      {"morph_targets", of_template.morph_targets}}},
                                     {"landmarks", landmarks}},
                                    2)
                              .c_str());
@@ -69,13 +68,13 @@ int show_head(const HeadInfoOptions& options) {
     print_output("  pupils     %.1f mm apart\n", 1e3 * distance_m);
   }
   if (of_template.vertices > 0) {
-    print_output("  template   %u vertices, %u triangles, %u facial actions\n", of_template.vertices,
-                 of_template.triangles, of_template.actions);
+    print_output("  template   %u vertices, %u triangles, %u morph targets\n", of_template.vertices,
+                 of_template.triangles, of_template.morph_targets);
   } else {
     print_output("  template   none: the installed bundle has none, see --bundle\n");
   }
   if (info.landmark_count > 0)
-    print_output("  landmarks  mm to the person's left, to the back, up; standard deviation\n");
+    print_output("  landmarks  mm to the person's left, up, to the front; standard deviation\n");
   for (const std::string& name : head.landmark_names()) {
     const maq_head_landmark landmark = head.landmark(name);
     print_output("    %-18s %7.1f %7.1f %7.1f  %.1f\n", name.c_str(), 1e3 * landmark.point_m[0],
@@ -113,22 +112,9 @@ double pupil_distance_m(const maquette::Head& head) {
                     left.point_m[2] - right.point_m[2]);
 }
 
-CLI::Option* add_topology_option(CLI::App& command, std::string& topology) {
-  return command
-      .add_option("--topology", topology,
-                  "field (default): the surface itself; template: the same vertices, texture coordinates and facial "
-                  "actions (morph targets) for every head")
-      ->check(CLI::IsMember({"field", "template"}));
-}
-
-maq_head_topology topology_of(const std::string& name) {
-  return name == "template" ? MAQ_HEAD_TOPOLOGY_TEMPLATE : MAQ_HEAD_TOPOLOGY_FIELD;
-}
-
 void add_head_info_command(CLI::App& head, int* exit_code) {
   auto options = std::make_shared<HeadInfoOptions>();
-  CLI::App* command =
-      head.add_subcommand("info", "Check a saved head and print its size, landmarks and facial actions");
+  CLI::App* command = head.add_subcommand("info", "Check a saved head and print its size and landmarks");
   command->add_option("head", options->path, "File that `maquette head --save` wrote")->required();
   command->add_option("--bundle", options->bundle,
                       "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");

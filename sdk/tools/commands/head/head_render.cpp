@@ -25,8 +25,8 @@ constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normal
 constexpr double kDegree_rad = 3.14159265358979323846 / 180;
 
 struct HeadRenderOptions {
-  std::string head, out, size, bundle, shading = "colour", topology = "field";
-  double cell_mm = 0;
+  std::string head, out, size, bundle, shading = "colour";
+  MeshChoice mesh;
   bool no_alpha = false, is_timed_clip = false, has_angle = false;
   HeadView view;
 };
@@ -77,12 +77,9 @@ int render_head(const HeadRenderOptions& given) {
   HeadView view = given.view;
   const auto name = std::find(kShadingNames.begin(), kShadingNames.end(), given.shading);
   view.shading = maq_head_shading(name - kShadingNames.begin());
-  maq_head_mesh_config mesh = maquette::default_head_mesh_config();
-  mesh.cell_m = given.cell_mm * 1e-3;
-  mesh.topology = topology_of(given.topology);
-  const std::string bundle =
-      mesh.topology == MAQ_HEAD_TOPOLOGY_TEMPLATE ? bundle_or_default(kHeadsNetworks, given.bundle) : "";
-  if (!bundle.empty()) mesh.model.bundle_path = bundle.c_str();
+  maq_head_mesh_config mesh = mesh_config(given.mesh);
+  const std::string bundle = bundle_of_mesh(mesh, given.bundle);
+  mesh.model.bundle_path = bundle.empty() ? nullptr : bundle.c_str();
   mesh.model.threads = view.threads;
   view.with_alpha = !given.no_alpha;
   if (!given.size.empty()) {
@@ -156,20 +153,15 @@ void add_head_render_command(CLI::App& head, int* exit_code) {
       ->check(CLI::Range(0, 255));
   command->add_flag("--no-alpha", options->no_alpha,
                     "Write a PNG with the background; default: transparent around the head");
-  CLI::Option* const cell = command
-                                ->add_option("--cell", options->cell_mm,
-                                             "Distance between vertices of the mesh, mm; default: 60,000 triangles")
-                                ->check(CLI::Range(0.5, 20.0));
-  add_topology_option(*command, options->topology)->excludes(cell);
-  command->add_option("--bundle", options->bundle,
-                      "Folder of the bundle with the template head; default: MAQ_HEADS_BUNDLE, then the installed one");
+  add_mesh_choice(*command, options->mesh);
+  add_template_bundle_option(*command, options->bundle);
   command->add_option("--threads", view.threads, "Threads; default: the large cores, at most 4")
       ->check(CLI::Range(1, 64));
   command->footer(
       "Shadings:\n"
       "  colour, shape   the head's colours, or grey, in soft light\n"
       "  normals         red to the right, green up, blue to the camera\n"
-      "  template        position on the template head: red to the person's left, green to the back, blue up\n"
+      "  template        position on the template head: red to the person's left, green up, blue to the front\n"
       "  depth           near is white, far is black\n\n"
       "Examples:\n"
       "  maquette head photo.jpg --save head.maqh\n"

@@ -21,12 +21,12 @@ using maq::head::MeshShading;
 
 constexpr double kRadius_m = 0.1, kDistance_m = 0.6;
 
-// From the front: x of the head to the right, z up. Pixels are not square.
+// From the front: x of the head to the right, y up. Pixels are not square.
 PinholeCamera from_the_front(int width_px = 160, int height_px = 120) {
   PinholeCamera camera;
   camera.width_px = width_px, camera.height_px = height_px;
-  camera.rotation = {1, 0, 0, 0, 0, -1, 0, 1, 0};
-  camera.centre = {0, -kDistance_m, 0};
+  camera.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  camera.centre = {0, 0, kDistance_m};
   camera.fx_px = 2.0 * height_px, camera.fy_px = 2.6 * height_px;
   camera.cx_px = (width_px - 1) / 2.0 + 3, camera.cy_px = (height_px - 1) / 2.0 - 2;
   return camera;
@@ -77,12 +77,12 @@ TEST(HeadRenderer, ShowsWhereRaysMeetTheBallInMetres) {
       EXPECT_EQ(picture.alpha[pixel], 255);
       EXPECT_NEAR(picture.depth[pixel], hit.depth_m, 4e-4);
       const double normal[3] = {hit.x_m / kRadius_m, hit.y_m / kRadius_m, (hit.depth_m - kDistance_m) / kRadius_m};
-      // In the head's frame y is to the back and z is up.
-      const double place[3] = {normal[0], normal[2], -normal[1]};
+      // In the mesh y is to the back and z is up; for apps y is up and z to the front.
+      const double own[3] = {normal[0], normal[2], -normal[1]}, of_app[3] = {normal[0], -normal[1], -normal[2]};
       for (size_t axis = 0; axis < 3; ++axis) {
         EXPECT_NEAR(picture.normals[3 * pixel + axis], normal[axis], 0.035);
-        EXPECT_NEAR(picture.template_points[3 * pixel + axis], 0.05 * place[axis], 1.5e-3);
-        EXPECT_NEAR(picture.bgr[3 * pixel + 2 - axis], 127.5 + 100 * place[axis], 3.5);
+        EXPECT_NEAR(picture.template_points[3 * pixel + axis], 0.05 * of_app[axis], 1.5e-3);
+        EXPECT_NEAR(picture.bgr[3 * pixel + 2 - axis], 127.5 + 100 * own[axis], 3.5);
       }
     }
   }
@@ -126,7 +126,7 @@ TEST(HeadRenderer, EachShadingTellsItsQuantity) {
   expect_rgb(MeshShading::kShape, 200, 200, 200);
   expect_rgb(MeshShading::kNormals, 127.5 + 127.5 * normal[0], 127.5 - 127.5 * normal[1], 127.5 - 127.5 * normal[2]);
   const double half = 127.5 * 0.5 / 1.4;
-  expect_rgb(MeshShading::kTemplate, 127.5 + half * normal[0], 127.5 + half * normal[2], 127.5 - half * normal[1]);
+  expect_rgb(MeshShading::kTemplate, 127.5 + half * normal[0], 127.5 - half * normal[1], 127.5 - half * normal[2]);
   // White and black are as far from the ball's middle as its bounding sphere reaches.
   const double grey = 127.5 - 127.5 * (hit.depth_m - kDistance_m) / kRadius_m;
   expect_rgb(MeshShading::kDepth, grey, grey, grey);
@@ -154,8 +154,8 @@ TEST(HeadRenderer, TheOrbitSeesTheWholeHeadFromWhereItSays) {
   HeadRenderer renderer(ball_mesh(0.05f), std::nullopt, with_shading(MeshShading::kColour));
   const double kQuarter = std::acos(0.0);
   for (const auto& [yaw, pitch, axis, sign] :
-       {std::tuple{0.0, 0.0, 1, -1}, std::tuple{kQuarter, 0.0, 0, 1}, std::tuple{-kQuarter, 0.0, 0, -1},
-        std::tuple{2 * kQuarter, 0.0, 1, 1}, std::tuple{0.4, kQuarter, 2, 1}, std::tuple{0.4, -kQuarter, 2, -1}}) {
+       {std::tuple{0.0, 0.0, 2, 1}, std::tuple{kQuarter, 0.0, 0, 1}, std::tuple{-kQuarter, 0.0, 0, -1},
+        std::tuple{2 * kQuarter, 0.0, 2, -1}, std::tuple{0.4, kQuarter, 1, 1}, std::tuple{0.4, -kQuarter, 1, -1}}) {
     for (const auto& [width, height] : {std::pair{200, 100}, std::pair{100, 200}}) {
       const PinholeCamera camera = renderer.orbit_camera(yaw, pitch, width, height);
       EXPECT_GT(sign * camera.centre[size_t(axis)], 0.3);
@@ -212,15 +212,15 @@ TEST(HeadRenderer, HostileCamerasGetAPictureOrASentence) {
     return count;
   };
   EXPECT_GT(covered([](PinholeCamera&) {}), 40);
-  EXPECT_EQ(covered([](PinholeCamera& c) { c.centre[1] = 0.6; }), 0) << "the head is behind it";
-  EXPECT_EQ(covered([](PinholeCamera& c) { c.centre[1] = -1e30; }), 0);
+  EXPECT_EQ(covered([](PinholeCamera& c) { c.centre[2] = -0.6; }), 0) << "the head is behind it";
+  EXPECT_EQ(covered([](PinholeCamera& c) { c.centre[2] = 1e30; }), 0);
   EXPECT_LE(covered([](PinholeCamera& c) { c.fx_px = c.fy_px = 1e-30; }), 1);
   EXPECT_LE(covered([](PinholeCamera& c) { c.fx_px = c.fy_px = 1e-310; }), 1);
   EXPECT_GE(covered([](PinholeCamera& c) { c.fx_px = c.fy_px = 1e30; }), 0);
   EXPECT_GE(covered([](PinholeCamera& c) { c.fx_px = c.fy_px = 1e300; }), 0);
   EXPECT_EQ(covered([](PinholeCamera& c) { c.cx_px = 1e300; }), 0);
-  EXPECT_GE(covered([](PinholeCamera& c) { c.centre[1] = 0; }), 0) << "inside of the head";
-  EXPECT_GE(covered([](PinholeCamera& c) { c.centre[1] = -0.1; }), 0) << "on its surface";
+  EXPECT_GE(covered([](PinholeCamera& c) { c.centre[2] = 0; }), 0) << "inside of the head";
+  EXPECT_GE(covered([](PinholeCamera& c) { c.centre[2] = 0.1; }), 0) << "on its surface";
   EXPECT_EQ(covered([](PinholeCamera& c) { c.width_px = c.height_px = 1; }) & ~1, 0);
   expect_error(MAQ_ERROR_UNSUPPORTED, "no surface", [] { HeadRenderer({}, std::nullopt, {}); });
 }

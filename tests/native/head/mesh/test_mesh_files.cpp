@@ -2,6 +2,7 @@
 // structure, and their faults named.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -194,6 +195,67 @@ TEST(MeshFiles, AGlbHasMorphTargetsWithNames) {
   const json& still = file["accessors"][primitive["targets"][1]["POSITION"].get<size_t>()];
   EXPECT_FALSE(still.contains("sparse"));
   EXPECT_FALSE(still.contains("bufferView")) << "all of it is 0";
+}
+
+// The upper half turns with the second joint.
+HeadMesh with_joints(HeadMesh mesh) {
+  mesh.joints = {{"Neck", -1, {0, 0.1f, -1}}, {"Head", 0, {0, 0.2f, 0}}};
+  for (size_t i = 0; i < mesh.vertex_count(); ++i) {
+    const float upper = std::clamp(mesh.positions[3 * i + 2], 0.0f, 1.0f);
+    mesh.vertex_joints.push_back({{0, uint8_t(upper > 0 ? 1 : 0), 0, 0}, {1 - upper, upper, 0, 0}});
+  }
+  return mesh;
+}
+
+TEST(MeshFiles, AGlbHasASkinWhoseJointsAreWhereTheMeshHasThem) {
+  const HeadMesh mesh = with_joints(example());
+  const auto bytes = maq::head::mesh_as_glb(mesh, {});
+  size_t begin = 0;
+  const json file = parse_glb(bytes, begin);
+  EXPECT_EQ(file["scenes"][0]["nodes"], json::array({0, 1}));
+  const json& nodes = file["nodes"];
+  ASSERT_EQ(nodes.size(), 3u);
+  EXPECT_EQ(nodes[0]["skin"], 0);
+  EXPECT_EQ(nodes[1]["name"], "Neck");
+  EXPECT_EQ(nodes[1]["children"], json::array({2}));
+  const float places[2][3] = {{0, -0.1f, -0.01f}, {0, 0, -0.02f}};  // metres, y up
+  for (size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(nodes[1]["translation"][axis].get<double>(), double(places[0][axis]), 1e-7);
+    EXPECT_NEAR(nodes[2]["translation"][axis].get<double>(), double(places[1][axis] - places[0][axis]), 1e-7);
+  }
+  const json& skin = file["skins"][0];
+  EXPECT_EQ(skin["joints"], json::array({1, 2}));
+  const auto inverse = floats_of(file, bytes, begin, skin["inverseBindMatrices"]);
+  ASSERT_EQ(inverse.size(), 32u);
+  for (size_t joint = 0; joint < 2; ++joint) {
+    for (size_t k = 0; k < 16; ++k) {
+      const double expected = k >= 12 && k < 15 ? -double(places[joint][k - 12]) : k % 5 == 0 ? 1 : 0;
+      EXPECT_NEAR(double(inverse[16 * joint + k]), expected, 1e-7) << k;
+    }
+  }
+  const json& attributes = file["meshes"][0]["primitives"][0]["attributes"];
+  const auto weights = floats_of(file, bytes, begin, attributes["WEIGHTS_0"]);
+  ASSERT_EQ(weights.size(), 4 * mesh.vertex_count());
+  const json& joints = file["accessors"][attributes["JOINTS_0"].get<size_t>()];
+  EXPECT_EQ(joints["componentType"], 5121);
+  EXPECT_FALSE(joints.contains("normalized"));
+}
+
+TEST(MeshFiles, JointsThatDoNotFitAreASentence) {
+  const HeadMesh right = with_joints(example());
+  const auto refused = [&](auto&& change) {
+    HeadMesh mesh = right;
+    change(mesh);
+    const TempFolder folder;
+    expect_error(MAQ_ERROR_INVALID_ARGUMENT, "joints of the mesh",
+                 [&] { write_mesh_file(mesh, folder.file("a.glb")); });
+  };
+  refused([](HeadMesh& mesh) { mesh.vertex_joints.pop_back(); });
+  refused([](HeadMesh& mesh) { mesh.joints.pop_back(); });
+  refused([](HeadMesh& mesh) { mesh.joints[1].parent = 1; });
+  refused([](HeadMesh& mesh) { mesh.joints[1].parent = -1; });
+  refused([](HeadMesh& mesh) { mesh.joints[0].position[1] = std::nanf(""); });
+  refused([](HeadMesh& mesh) { mesh.vertex_joints[3].weights[0] = -0.5f; });
 }
 
 TEST(MeshFiles, WhatIsWrongWithAMeshIsSaidAndNoFileIsLeft) {

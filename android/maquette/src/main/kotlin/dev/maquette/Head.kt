@@ -4,7 +4,7 @@ import dev.maquette.jni.*
 
 /**
  * A 3D head, coloured and in metres. Made by [HeadBuilder.fit] and [Maquette.openHead]; shown by a [HeadRenderer]. Points
- * are in metres: x to the person's left, y to the back of the head, z up, the origin in its middle. It holds no photo, but
+ * are in metres: x to the person's left, y up, z to the front, as in glTF, the origin in the middle of the head. It holds no photo, but
  * a texture has the face's pixels. All functions may be called from any thread.
  */
 class Head internal constructor(pointer: Long) : AutoCloseable {

@@ -44,7 +44,6 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
      * @property provider as of [DensePose.Config].
      * @property texture with 1024 pixels a fit takes 140 MB of memory more.
      * @property texturePx pixels a side, 256 to 2048; 0: 1024. Not with [Texture.OFF].
-     * @property mirrorUnseen if no photo sees one side of the head, the texture of the other side is mirrored.
      * @property delightTexture directional light of the photos is removed from the texture, as far as the colours tell it,
      *   so that an app can relight the head.
      */
@@ -53,7 +52,6 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
         val provider: DensePose.Provider = DensePose.Provider.CPU,
         val texture: Texture = Texture.DEFAULT,
         val texturePx: Int = 0,
-        val mirrorUnseen: Boolean = false,
         val delightTexture: Boolean = false,
     ) {
         internal fun native(bundle: ModelBundle) =
@@ -61,7 +59,6 @@ class HeadBuilder internal constructor(pointer: Long) : AutoCloseable {
                 it.model.set(bundle, threads, provider)
                 it.texture = texture.code
                 it.texture_px = texturePx
-                it.mirror_unseen = mirrorUnseen.toInt()
                 it.delight_texture = delightTexture.toInt()
                 it.progress_callback = Addresses.ofProgressCallback()
             }

@@ -6,21 +6,9 @@ import java.nio.ByteOrder
 import java.nio.FloatBuffer
 import java.nio.IntBuffer
 
-/** Which vertices and triangles the mesh of a head has. */
-enum class HeadTopology(internal val code: Int) {
-    /** The surface itself, closed. */
-    FIELD(MAQ_HEAD_TOPOLOGY_FIELD),
-
-    /**
-     * The template head, registered to the surface: the same vertices for every head, with texture coordinates, eyeballs,
-     * teeth, tongue, and morph targets for facial actions. It is open at the neck; hair, beards and glasses are as coarse
-     * as skin.
-     */
-    TEMPLATE(MAQ_HEAD_TOPOLOGY_TEMPLATE),
-}
-
 /**
- * The surface of a head. It ends below the chin, and is closed except with [HeadTopology.TEMPLATE]. Made by [Head.mesh].
+ * The surface of a head, made by [Head.mesh]. It ends below the chin. The animatable head is open there, the dense surface
+ * closed.
  *
  * Arrays are copied at the first use and stay valid after [close]. Buffers are direct and read-only, in native byte order,
  * each time with their own position: they can be given to OpenGL. Where there are texture coordinates, vertices at seams
@@ -30,19 +18,19 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
     internal val handle = Handle(this, pointer, Native::maq_head_mesh_destroy)
 
     /**
-     * How fine a mesh is, and which vertices it has. 0 means the default.
+     * The default is an animatable head: the same vertices, triangles and texture coordinates for every head, with
+     * eyeballs, teeth, tongue, facial actions and visemes, and joints in .glb files.
      *
-     * @property triangleCount about this many, 100 or more; 0: 60,000, or all if [cellM] is set; [ALL_TRIANGLES]: all.
-     * @property cellM distance between neighbouring vertices of the full mesh, about, 0.0005 to 0.02 metres; 0: 0.0021, or
-     *   0.0016 for more than 60,000 triangles.
-     * @property topology with [HeadTopology.TEMPLATE], [triangleCount] and [cellM] must be 0.
-     * @property bundle networks of heads with the template, for [HeadTopology.TEMPLATE] of an opened head: its file has no
+     * @property triangleCount the dense, closed surface instead, with about this many triangles, 100 or more;
+     *   [ALL_TRIANGLES]: all.
+     * @property cellM also the dense surface, with this distance between neighbouring vertices before triangles are
+     *   removed, 0.0005 to 0.02 metres; 0: 0.0021, or 0.0016 for more than 60,000 triangles.
+     * @property bundle networks of heads with the template, for the animatable mesh of an opened head: its file has no
      *   template. A fitted head keeps the template of its builder.
      */
     data class Config(
         val triangleCount: Int = 0,
         val cellM: Double = 0.0,
-        val topology: HeadTopology = HeadTopology.FIELD,
         val bundle: ModelBundle? = null,
     ) {
         init {
@@ -54,7 +42,6 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
                 bundle?.writeTo(it.model)
                 it.triangle_count = triangleCount
                 it.cell_m = cellM
-                it.topology = topology.code
             }
 
         companion object {
@@ -64,10 +51,11 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
     }
 
     /**
-     * A facial action at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The deltas of
+     * A facial action or a viseme at its strongest: vertices go to position + weight * delta, with a weight of 0 to 1. The deltas of
      * several actions add up.
      *
-     * @property name one of ARKit's 52, such as jawOpen or eyeBlinkLeft; left is the person's left.
+     * @property name one of ARKit's 52 actions, such as jawOpen or eyeBlinkLeft; left is the person's left. Or one of 15
+     *   visemes for speech, such as viseme_aa.
      * @property vertices the vertices that move, in increasing order.
      * @property deltasM x, y, z of each of them, in metres.
      */
@@ -121,13 +109,10 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
     /** The largest distance of a vertex of the full mesh from this one; 0 if nothing was removed. */
     val simplificationErrorM: Float get() = arrays.simplificationErrorM
 
-    /**
-     * A square JPEG file, for `BitmapFactory`; null if the head has no texture, and with [HeadTopology.TEMPLATE], which has
-     * another layout.
-     */
+    /** A square JPEG file, for `BitmapFactory`; null if the head has no texture. */
     val textureJpeg: ByteArray? get() = arrays.textureJpeg
 
-    /** Facial actions, with [HeadTopology.TEMPLATE]; else none. */
+    /** Facial actions and visemes of the animatable head; none of the dense surface. */
     val morphTargets: List<MorphTarget> get() = arrays.morphTargets
 
     /** x, y, z of each vertex, in metres. */
@@ -142,7 +127,7 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
      */
     val templatePoints: FloatBuffer get() = floats(2)!!
 
-    /** u to the right and v down of each vertex, 0 to 1; null without a texture, except with [HeadTopology.TEMPLATE]. */
+    /** u to the right and v down of each vertex, 0 to 1; null of the dense surface without a texture. */
     val textureCoordinates: FloatBuffer? get() = floats(3)
 
     /** Red, green, blue of each vertex, sRGB. */

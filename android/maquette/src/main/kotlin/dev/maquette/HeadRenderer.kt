@@ -28,7 +28,7 @@ class HeadRenderer internal constructor(context: Long, mesh: HeadMesh, config: C
         /** Red to the right, green up, blue to the camera, as in normal maps. */
         NORMALS(MAQ_HEAD_SHADING_NORMALS),
 
-        /** Template points: red to the person's left, green to the back, blue up. */
+        /** Template points: red to the person's left, green up, blue to the front. */
         TEMPLATE(MAQ_HEAD_SHADING_TEMPLATE),
 
         /** White is near, black is far. */

@@ -101,11 +101,11 @@ class HeadTest : AndroidTest() {
             head.close()
             assertTrue("${mesh.vertexCount}", mesh.vertexCount > 300)
             assertEquals("closed", 2 * (mesh.vertexCount - 2), mesh.triangleCount)
-            val crown = head.landmarks["crown"]!!.point.z
+            val crown = head.landmarks["crown"]!!.point.y
             val template = mesh.templatePoints.points()
             for ((k, p) in mesh.positions.points().withIndex()) {
                 assertTrue("$p", length(p) < 0.3)
-                assertEquals("the crown of the template is at 121 mm", p.z * 0.121, template[k].z * crown, 1e-3)
+                assertEquals("the crown of the template is at 121 mm", p.y * 0.121, template[k].y * crown, 1e-3)
             }
             for (n in mesh.normals.points()) assertEquals(1.0, length(n), 1e-4)
             val triangles = IntArray(3 * mesh.triangleCount).also { mesh.triangles.get(it) }
@@ -131,8 +131,6 @@ class HeadTest : AndroidTest() {
             assertThrows(IllegalArgumentException::class.java) { HeadMesh.Config(-2) }
             failure(Status.INVALID_ARGUMENT) { head.mesh(HeadMesh.Config(99)) }
             failure(Status.INVALID_ARGUMENT) { head.mesh(HeadMesh.Config(cellM = 1.0)) }
-            val both = HeadMesh.Config(500, topology = HeadTopology.TEMPLATE)
-            failure(Status.INVALID_ARGUMENT) { head.mesh(both) }
             val meshes = listOf(coarse, HeadMesh.Config(cellM = 0.01)).map { config -> config to head.mesh(config) }
             val threads = meshes.map { (config, expected) ->
                 var same = 0
@@ -173,10 +171,9 @@ class HeadTest : AndroidTest() {
     }
 
     @Test
-    fun theTemplatesTopologyIsTheSameForEachHeadAndHasMorphTargets() = TestFiles.inNewFolder<Unit> { folder ->
-        val template = HeadMesh.Config(topology = HeadTopology.TEMPLATE)
+    fun theAnimatableHeadHasMorphTargetsAndTheTemplateOfABundle() = TestFiles.inNewFolder<Unit> { folder ->
         head().use { head ->
-            val mesh = head.mesh(template)
+            val mesh = head.mesh()
             assertTrue(mesh.morphTargets.isNotEmpty())
             for (target in mesh.morphTargets) {
                 assertTrue(target.name, target.name.isNotEmpty() && target.vertices.isNotEmpty())
@@ -196,9 +193,9 @@ class HeadTest : AndroidTest() {
             head.save(file.path)
             maquette.openHead(file.path).use { opened ->
                 val densePose = ModelBundle.ofFolder(TestFiles.bundle.path)
-                failure(Status.UNSUPPORTED) { opened.mesh(template.copy(bundle = densePose)) }
+                failure(Status.UNSUPPORTED) { opened.mesh(HeadMesh.Config(bundle = densePose)) }
                 val inMemory = ModelBundle.ofBuffers(TestFiles.bundleInMemory(TestFiles.roundHeadsBundle))
-                val again = opened.mesh(template.copy(bundle = inMemory))
+                val again = opened.mesh(HeadMesh.Config(bundle = inMemory))
                 assertEquals(mesh.triangles, again.triangles)
                 assertNear(mesh.positions, again.positions)
             }
@@ -207,13 +204,14 @@ class HeadTest : AndroidTest() {
 
     @Test
     fun aTextureIsMadeUnlessItIsSwitchedOff() {
-        head(HeadBuilder.Config(texturePx = 256, mirrorUnseen = true)).use { head ->
+        head(HeadBuilder.Config(texturePx = 256)).use { head ->
             assertEquals(256, head.info.texturePx)
             val mesh = head.mesh(coarse)
             maquette.decode(mesh.textureJpeg!!).use { assertEquals(256 to 256, it.widthPx to it.heightPx) }
             val coordinates = mesh.textureCoordinates!!
             assertEquals(2 * mesh.vertexCount, coordinates.remaining())
             assertTrue((0 until coordinates.limit()).all { coordinates[it] in 0f..1f })
+            maquette.decode(head.mesh().textureJpeg!!).use { assertEquals(512 to 512, it.widthPx to it.heightPx) }
         }
         val on = HeadBuilder.Config()
         val small = on.copy(texturePx = 255)
@@ -499,7 +497,7 @@ class HeadTest : AndroidTest() {
                 val (x, y) = made.cameras.single().pixel(nose)
                 assertTrue("($x, $y) in $found", x > found.left && x < found.right && y > found.top && y < found.bottom)
                 assertEquals(12, made.landmarks.size)
-                assertEquals(52, made.mesh(HeadMesh.Config(topology = HeadTopology.TEMPLATE)).morphTargets.size)
+                assertEquals(52 + 15, made.mesh().morphTargets.size)
             }
         }
     }

@@ -254,7 +254,6 @@ internal const val MAQ_HEAD_SHADING_NORMALS = 2; internal const val MAQ_HEAD_SHA
 internal const val MAQ_HEAD_SHADING_DEPTH = 4
 internal const val MAQ_HEAD_TEXTURE_DEFAULT = 0; internal const val MAQ_HEAD_TEXTURE_OFF = 1
 internal const val MAQ_HEAD_TEXTURE_ON = 2
-internal const val MAQ_HEAD_TOPOLOGY_FIELD = 0; internal const val MAQ_HEAD_TOPOLOGY_TEMPLATE = 1
 internal const val MAQ_IMAGE_ALPHA_OFF = 0; internal const val MAQ_IMAGE_ALPHA_ON = 1
 internal const val MAQ_IMAGE_PLANE_BGR = 1; internal const val MAQ_IMAGE_PLANE_ALPHA = 2
 internal const val MAQ_IMAGE_PLANE_DEPTH = 3; internal const val MAQ_IMAGE_PLANE_NORMALS = 4
@@ -518,8 +517,7 @@ internal class maq_head_build_stats(outer: Memory? = null, at: Int = 0) : Struct
 internal class maq_head_builder_config(outer: Memory? = null, at: Int = 0) : Struct(72, outer, at) {
     val model = maq_model_options(this, 8); var texture: Int get() = int(40); set(v) = int(40, v)
     var texture_px: Int get() = int(44); set(v) = int(44, v)
-    var mirror_unseen: Int get() = int(48); set(v) = int(48, v)
-    var delight_texture: Int get() = int(52); set(v) = int(52, v)
+    var delight_texture: Int get() = int(48); set(v) = int(48, v)
     var progress_callback: Long get() = long(56); set(v) = long(56, v)
 }
 
@@ -533,8 +531,7 @@ internal class maq_head_landmark(outer: Memory? = null, at: Int = 0) : Struct(32
 }
 
 internal class maq_head_mesh_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val model = maq_model_options(this, 8); var topology: Int get() = int(40); set(v) = int(40, v)
-    var triangle_count: Int get() = int(44); set(v) = int(44, v)
+    val model = maq_model_options(this, 8); var triangle_count: Int get() = int(40); set(v) = int(40, v)
     var cell_m: Double get() = double(48); set(v) = double(48, v)
 }
 

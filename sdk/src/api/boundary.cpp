@@ -115,8 +115,8 @@ maq_status run_alone(const Handle* handle, HandleKind kind, const char* name, co
   });
 }
 
-void take_back(Handle* handle, HandleKind kind, const char* name, const char* function, const Call& reclaim,
-               WhileInUse while_in_use) noexcept {
+void reclaim_handle(Handle* handle, HandleKind kind, const char* name, const char* function, const Call& reclaim,
+                    WhileInUse while_in_use) noexcept {
   if (handle == nullptr) return;
   guarded(nullptr, function, [&] {
     HandleState& state = handle->handle_state();

@@ -88,8 +88,8 @@ enum class WhileInUse { kRefused, kAllowed };
 
 // For `_destroy`, `_close` and `_release`: `reclaim` gets the handle unless it is NULL. The app keeps handles that it
 // cannot give back: a handle of another type, one that was given back before, or one with a running call.
-void take_back(Handle* handle, HandleKind kind, const char* name, const char* function, const Call& reclaim,
-               WhileInUse while_in_use) noexcept;
+void reclaim_handle(Handle* handle, HandleKind kind, const char* name, const char* function, const Call& reclaim,
+                    WhileInUse while_in_use) noexcept;
 
 template <class T, class Reclaim>
 struct Reclaiming {
@@ -105,7 +105,7 @@ template <class T, class Reclaim>
 void return_handle(T* handle, const char* name, const char* function, Reclaim&& reclaim,
                    WhileInUse while_in_use = WhileInUse::kRefused) noexcept {
   const Reclaiming<T, Reclaim> call{handle, reclaim};
-  take_back(handle, T::kKind, name, function, Call(call), while_in_use);
+  reclaim_handle(handle, T::kKind, name, function, Call(call), while_in_use);
 }
 
 template <class T>

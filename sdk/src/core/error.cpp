@@ -1,5 +1,6 @@
 #include "core/error.h"
 
+#include <array>
 #include <locale>
 #include <sstream>
 
@@ -31,6 +32,16 @@ Failure current_failure() noexcept {
   } catch (...) {
     return {MAQ_ERROR_INTERNAL, "An unknown exception was thrown."};
   }
+}
+
+bool says_out_of_memory(std::string_view text) {
+  // std::bad_alloc, ONNX Runtime's arena and strerror(ENOMEM), glibc's loader, libjpeg.
+  constexpr std::array<std::string_view, 5> kWords = {"bad_alloc", "llocate memory", "emory alloc", "ut of memory",
+                                                      "nsufficient memory"};
+  for (const std::string_view words : kWords) {
+    if (text.find(words) != std::string_view::npos) return true;
+  }
+  return false;
 }
 
 }  // namespace maq

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <type_traits>
 
@@ -74,5 +75,8 @@ struct Failure {
 // Returns the status and text of the exception being handled. Call it in the catch block. Exceptions from outside the
 // library are MAQ_ERROR_INTERNAL.
 Failure current_failure() noexcept;
+
+// Whether the text of a foreign library's error says that there was no memory.
+bool says_out_of_memory(std::string_view text);
 
 }  // namespace maq

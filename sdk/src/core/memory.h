@@ -1,13 +1,9 @@
-// Too little memory, where foreign libraries tell of it in words or not at all.
+// Too little memory, where foreign libraries do not tell of it.
 #pragma once
 
 #include <cstddef>
-#include <string_view>
 
 namespace maq {
-
-// Whether the text of a foreign library's error says that there was no memory.
-bool says_out_of_memory(std::string_view text);
 
 // Whether the process could get that much memory now.
 bool has_memory(size_t bytes);

@@ -17,7 +17,6 @@
 #include <new>
 
 #include "core/error.h"
-#include "core/memory.h"
 
 extern char** environ;
 

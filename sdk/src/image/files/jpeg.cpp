@@ -8,7 +8,6 @@
 #include <new>
 
 #include "core/error.h"
-#include "core/memory.h"
 #include "image/convert.h"
 #include "image/files/image_header.h"
 

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/memory.h"
 
 namespace maq {
 namespace {

@@ -11,9 +11,6 @@ namespace {
 
 constexpr double kShareOfDepth = 0.85;  // of the time
 constexpr size_t kVoters = 8;           // neighbours whose depth is asked about a point
-// With few photos few neighbours can confirm a depth: then all depth counts (docs/research/scenes.md, "Fusion").
-constexpr size_t kPhotosWithTrust = 30;
-constexpr int kTrust = 5;
 
 std::string text_of_step(size_t photo, size_t photos) {
   return "Depth of photo " + std::to_string(photo + 1) + " of " + std::to_string(photos);
@@ -85,10 +82,8 @@ std::optional<DenseCloud> make_dense_cloud(const DenseCloudInput& input, const D
   DenseCloud made;
   WorkerThreads threads(options.threads);
   if (!find_depth(load_grey(input), input.points, threads, progress, made.maps)) return {};
-  FusionRule rule;
-  rule.min_trust = input.photos < kPhotosWithTrust ? 0 : kTrust;
   bool is_cancelled = false;
-  std::vector<FusedPixel> pixels = fuse_depth_maps(made.maps, rule, options.max_points, threads, [&](double done) {
+  std::vector<FusedPixel> pixels = fuse_depth_maps(made.maps, {}, options.max_points, threads, [&](double done) {
     is_cancelled = progress && !progress(kShareOfDepth + (1 - kShareOfDepth) * done, "Fusing the depth of all photos");
     return !is_cancelled;
   });

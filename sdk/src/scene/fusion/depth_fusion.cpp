@@ -9,7 +9,7 @@ namespace maq {
 namespace {
 
 constexpr int kVoteRows = 16;
-constexpr double kVotingFraction = 0.49;  // of the time, of each of the two passes
+constexpr double kVotingFraction = 0.98;  // of the time
 
 size_t width_of(const DepthMap& map) { return size_t(map.camera.width_px); }
 size_t height_of(const DepthMap& map) { return size_t(map.camera.height_px); }
@@ -95,45 +95,30 @@ uint64_t next_random(uint64_t& state) {
 
 std::vector<FusedPixel> fuse_depth_maps(const std::vector<DepthMap>& maps, const FusionRule& rule, uint64_t max_points,
                                         WorkerThreads& threads, const FusionProgress& progress) {
-  const auto tell = [&](size_t pass, size_t map) {
-    return !progress || progress(kVotingFraction * (double(pass) + double(map + 1) / double(maps.size())));
-  };
-  // How many neighbours agree with each pixel, itself included; 0 where its depth is unknown.
-  std::vector<std::vector<uint8_t>> agreeing(maps.size());
+  std::vector<std::vector<uint8_t>> kept(maps.size());
+  uint64_t total = 0;
   for (size_t of = 0; of < maps.size(); ++of) {
-    std::vector<uint8_t>& counts = agreeing[of];
-    counts.resize(maps[of].depth.size());
-    for (size_t i = 0; i < counts.size(); ++i) counts[i] = maps[of].depth[i] > 0 ? 1 : 0;
+    const DepthMap& map = maps[of];
+    std::vector<uint16_t> agreeing(map.depth.size()), behind(map.depth.size());
+    kept[of].resize(map.depth.size());
     for_votes(
         maps, of, threads,
         [&](size_t pixel, float depth, uint32_t other, size_t there) {
           const float found = maps[other].depth[there];
-          if (found > 0 && std::abs(found - depth) < rule.agreement * depth && counts[pixel] < 255) ++counts[pixel];
-        },
-        [](size_t, size_t) {});
-    if (!tell(0, of)) return {};
-  }
-  std::vector<std::vector<uint8_t>> kept(maps.size());
-  uint64_t total = 0;
-  for (size_t of = 0; of < maps.size(); ++of) {
-    std::vector<uint8_t>& behind = kept[of];
-    behind.resize(maps[of].depth.size());
-    for_votes(
-        maps, of, threads,
-        [&](size_t pixel, float depth, uint32_t other, size_t there) {
-          const bool is_trusted = agreeing[other][there] > rule.min_trust;
-          if (is_trusted && maps[other].depth[there] > (1 + rule.farther) * depth && behind[pixel] < 255) {
+          if (found > (1 + rule.farther) * depth) {
             ++behind[pixel];
+          } else if (found > 0 && std::abs(found - depth) < rule.agreement * depth) {
+            ++agreeing[pixel];
           }
         },
         [&](size_t first, size_t count) {
           for (size_t i = first; i < first + count; ++i) {
-            const int votes = agreeing[of][i];
-            behind[i] = votes > 0 && float(votes) >= rule.factor * float(behind[i]) ? 1 : 0;
+            const bool is_kept = map.depth[i] > 0 && float(1 + agreeing[i]) >= rule.factor * float(behind[i]);
+            kept[of][i] = is_kept ? 1 : 0;
           }
         });
-    for (const uint8_t is_kept : behind) total += is_kept;
-    if (!tell(1, of)) return {};
+    for (const uint8_t is_kept : kept[of]) total += is_kept;
+    if (progress && !progress(kVotingFraction * double(of + 1) / double(maps.size()))) return {};
   }
   // Selection sampling: each pixel is taken with the probability still needed / still left.
   uint64_t needed = max_points == 0 ? total : std::min(max_points, total), state = 0;

@@ -21,9 +21,7 @@ struct DepthMap {
 struct FusionRule {
   float agreement = 0.01f;  // difference of depth within which maps agree, as a part of it
   float farther = 0.03f;    // difference from which a map sees through a point
-  // Depth that so many neighbours agree with is trusted: only it can remove points.
-  int min_trust = 0;
-  // A point is kept while (1 + maps that agree) >= factor x (trusted depths behind it).
+  // A point is kept while (1 + maps that agree) >= factor x (maps that see through it).
   float factor = 2;
 };
 

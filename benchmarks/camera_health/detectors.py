@@ -1,4 +1,4 @@
-"""What finds events: camera health, and two baselines that only say that something happened."""
+"""Detectors of events: camera health, and two baselines that only say that something happened."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// What happens to a camera, and what does not: events of made streams, what ends a stream, pictures of any kind.
+// Camera health: events of made streams, what ends a stream, pictures of any kind.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ class Scene {
       }
     }
   }
-  // What a camera sees whose picture moved by (x, y).
+  // The view of a camera whose picture moved by (x, y).
   maq::Frame seen(int x, int y) const {
     maq::Frame frame;
     uint8_t* pixels = frame.allocate_bgr(320, 240);

@@ -23,7 +23,7 @@ class CameraHealth {
   // Forgets the stream.
   void reset();
 
-  // Of the latest frame: the patches and how far motion leaves each unexplained, 0 to 1. No patches for frames below
+  // Returns the patches of the latest frame, and how far motion leaves each unexplained, 0 to 1. No patches for frames below
   // some 32 pixels, of which only freezes and black pictures are found.
   const PictureMatch& match() const { return match_; }
 

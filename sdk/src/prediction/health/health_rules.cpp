@@ -25,7 +25,7 @@ constexpr float kCalmShare = 0.1f, kCalmRatio = 1.5f, kCalmShift = 0.008f;
 constexpr size_t kMinBefore = 4;  // frames: before, nothing is known to be usual
 constexpr int kRestFrames = 4, kMaxDisturbedFrames = 30;
 
-// What changed from before a disturbance to after it.
+// Limits for the change from before a disturbance to after it.
 constexpr float kCutShare = 0.42f;     // unexplained in the first frame of another scene
 constexpr float kWholePicture = 0.8f;  // no hand covers so much in one frame
 constexpr float kAroundCut = 0.5f;     // as a part of it, unexplained in the frames before and after
@@ -126,7 +126,7 @@ bool HealthRules::find_object(const PictureMatch& since_rest, HealthResult& resu
   return true;
 }
 
-// Of a picture that has rested for some frames.
+// The picture has rested for some frames.
 void HealthRules::name_event(const SmallPicture& picture, const PictureMatch& match, HealthResult& result) {
   if (lost_detail(match.flat_share()) && is_covered(change_)) {
     result.event = state_ = CameraEvent::kCovered;
@@ -204,7 +204,7 @@ bool HealthRules::find_outage(bool is_equal, const Brightness& brightness, int64
   const CameraEvent before = state_;
   const bool was_out = before == CameraEvent::kBlack || before == CameraEvent::kFreeze;
   if (!is_black && !is_frozen) {
-    // What the camera shows now may be anything.
+    // The camera may show anything now.
     if (was_out) reset();
     return false;
   }

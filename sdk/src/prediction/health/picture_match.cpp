@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kPatchStep_px = kPatch_px / 2;
 constexpr int kReachX_px = 10, kReachY_px = 8;  // of the coarse search: a quarter of the width of a usual frame
-// What motion leaves of a patch without being seen: a part of its own contrast, and noise (squared grey levels).
+// Motion may leave so much of a patch: a part of its own contrast, and noise (squared grey levels).
 constexpr float kContrastPart = 0.3f, kNoise = 8;
 constexpr float kFlatDetail = 8;       // squared grey levels: below, a patch has no detail but shading
 constexpr float kDetailContrast = 25;  // from here on its motion is known
@@ -172,7 +172,7 @@ void PictureMatch::find_camera_motion() {
     float count = 0, x = 0, y = 0, dx = 0, dy = 0, squares = 0, along = 0, across = 0;
     known = with_detail = together = 0;
     for (size_t i = 0; i < patches_.size(); ++i) {
-      // What came into view is not in the other picture.
+      // A patch that came into view is not in the other picture.
       with_detail += patches_[i].contrast > kDetailContrast && is_in_view(i) ? 1 : 0;
       if (!is_known(i)) continue;
       ++known;
@@ -203,7 +203,7 @@ void PictureMatch::find_camera_motion() {
   explained_detail_share_ = with_detail > 0 ? float(known) / float(with_detail) : 1;
 }
 
-// What the other picture does not show is not unexplained.
+// Patches that the other picture does not show are not unexplained.
 void PictureMatch::leave_out_what_came_into_view() {
   if (shift_share_ < kMinShiftShare) return;
   for (size_t i = 0; i < patches_.size(); ++i) {

@@ -23,8 +23,8 @@ class CameraHealth {
   // Forgets the stream.
   void reset();
 
-  // Returns the patches of the latest frame, and how far motion leaves each unexplained, 0 to 1. No patches for frames below
-  // some 32 pixels, of which only freezes and black pictures are found.
+  // Returns the patches of the latest frame, and how far motion leaves each unexplained, 0 to 1. No patches for frames
+  // below some 32 pixels, of which only freezes and black pictures are found.
   const PictureMatch& match() const { return match_; }
 
  private:

@@ -14,28 +14,28 @@ constexpr int kFrozenFrames = 2, kFrozenFramesAlone = 9;
 constexpr int64_t kFrozenTime_ns = 300000000;
 constexpr float kBlackBrightest = 40, kBlackDeviation = 6;    // grey levels
 constexpr float kLostDetail = 0.25f, kRegainedDetail = 0.2f;  // of the patches that usually have some
-constexpr float kMinDetailShare = 0.15f;                      // of patches: below, lost detail says nothing
-constexpr float kMostFlat = 0.5f;                             // of patches
+constexpr float kMinDetailFraction = 0.15f;                   // of patches: below, lost detail says nothing
+constexpr float kLargelyFlat = 0.5f;                          // of patches
 constexpr float kUsualRate = 1.0f / 30;                       // of the running mean of flat patches
 
 // A disturbance begins with patches that nothing explains where none were, or with a jump of the whole picture.
-constexpr float kNewShare = 0.02f;
-constexpr float kJump = 0.02f, kJumpRatio = 3, kJumpShare = 0.5f;
-constexpr float kCalmShare = 0.1f, kCalmRatio = 1.5f, kCalmShift = 0.008f;
+constexpr float kNewFraction = 0.02f;
+constexpr float kJump = 0.02f, kJumpRatio = 3, kJumpFraction = 0.5f;
+constexpr float kCalmFraction = 0.1f, kCalmRatio = 1.5f, kCalmShift = 0.008f;
 constexpr size_t kMinBefore = 4;  // frames: before, nothing is known to be usual
 constexpr int kRestFrames = 4, kMaxDisturbedFrames = 30;
 
 // Limits for the change from before a disturbance to after it.
-constexpr float kCutShare = 0.42f;     // unexplained in the first frame of another scene
+constexpr float kCutFraction = 0.42f;  // unexplained in the first frame of another scene
 constexpr float kWholePicture = 0.8f;  // no hand covers so much in one frame
 constexpr float kAroundCut = 0.5f;     // as a part of it, unexplained in the frames before and after
 constexpr float kAbruptRatio = 0.6f, kMuchWorse = 2;
-constexpr float kMovedShift = 0.06f, kMovedShare = 0.33f;
-constexpr float kObjectShare = 0.02f, kMinNewOfObject = 0.035f, kStillShare = 0.4f;
+constexpr float kMovedShift = 0.06f, kMovedFraction = 0.33f;
+constexpr float kObjectFraction = 0.02f, kMinNewOfObject = 0.035f, kStillFraction = 0.4f;
 
 // The motion of the whole picture, in fractions of its width; 0 where it has none in common.
 float shift_of(const PictureMatch& match) {
-  return match.shift_share() >= kJumpShare ? std::hypot(match.shift_x(), match.shift_y()) : 0;
+  return match.shift_fraction() >= kJumpFraction ? std::hypot(match.shift_x(), match.shift_y()) : 0;
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ void HealthRules::reset() {
   next_ = known_ = 0;
 }
 
-float HealthRules::new_share(const PictureMatch& match) const {
+float HealthRules::new_fraction(const PictureMatch& match) const {
   const std::vector<float>& now = match.unexplained();
   if (now.empty()) return 0;
   size_t count = 0;
@@ -67,8 +67,8 @@ float HealthRules::new_share(const PictureMatch& match) const {
 }
 
 bool HealthRules::is_disturbed(const PictureMatch& match) const {
-  if (known_ < kMinBefore) return match.unexplained_share() >= kCutShare;
-  if (new_share(match) >= kNewShare) return true;
+  if (known_ < kMinBefore) return match.unexplained_fraction() >= kCutFraction;
+  if (new_fraction(match) >= kNewFraction) return true;
   const float usual = *std::max_element(shifts_.begin(), shifts_.begin() + ptrdiff_t(known_));
   return shift_of(match) >= std::max(kJump, kJumpRatio * usual);
 }
@@ -76,16 +76,16 @@ bool HealthRules::is_disturbed(const PictureMatch& match) const {
 bool HealthRules::is_calm(const PictureMatch& match) const {
   float usual = 0, usual_shift = 0;
   for (size_t i = 0; i < known_; ++i) {
-    usual = std::max(usual, shares_[i]);
+    usual = std::max(usual, fractions_[i]);
     usual_shift = std::max(usual_shift, shifts_[i]);
   }
-  return match.unexplained_share() <= std::max(kCalmShare, kCalmRatio * usual) &&
+  return match.unexplained_fraction() <= std::max(kCalmFraction, kCalmRatio * usual) &&
          shift_of(match) <= std::max(kCalmShift, kCalmRatio * usual_shift);
 }
 
 void HealthRules::remember(const PictureMatch& match) {
   unexplained_[next_] = match.unexplained();
-  shares_[next_] = match.unexplained_share();
+  fractions_[next_] = match.unexplained_fraction();
   shifts_[next_] = shift_of(match);
   next_ = (next_ + 1) % kBefore;
   known_ = std::min(known_ + 1, kBefore);
@@ -93,21 +93,21 @@ void HealthRules::remember(const PictureMatch& match) {
 
 void HealthRules::forget_usual() { known_ = next_ = 0; }
 
-bool HealthRules::lost_detail(float flat_share) const {
-  const float usual = 1 - usual_flat_share_;
+bool HealthRules::lost_detail(float flat_fraction) const {
+  const float usual = 1 - usual_flat_fraction_;
   const float limit = state_ == CameraEvent::kCovered ? kRegainedDetail : kLostDetail;
-  return usual >= kMinDetailShare && flat_share - usual_flat_share_ >= limit * usual;
+  return usual >= kMinDetailFraction && flat_fraction - usual_flat_fraction_ >= limit * usual;
 }
 
 // The rest of the picture is still there, unless most of it is covered.
 bool HealthRules::is_covered(const PictureMatch& change) const {
-  return lost_detail(change.flat_share()) &&
-         (change.flat_share() >= kMostFlat || change.explained_detail_share() >= 0.5f);
+  return lost_detail(change.flat_fraction()) &&
+         (change.flat_fraction() >= kLargelyFlat || change.explained_detail_fraction() >= 0.5f);
 }
 
 // The first frame is the worst, at places where all was explained before.
 bool HealthRules::is_abrupt() const {
-  return new_share_ >= kMinNewOfObject && other_share_ <= kAbruptRatio * peak_share_;
+  return new_fraction_ >= kMinNewOfObject && other_fraction_ <= kAbruptRatio * peak_fraction_;
 }
 
 // An object stays where it is, or moves with the picture; what passes does not.
@@ -120,7 +120,7 @@ bool HealthRules::find_object(const PictureMatch& since_rest, HealthResult& resu
     count += 1;
     still += since_rest.unexplained()[i] <= kUnexplained && since_rest.is_at_rest(i) ? 1.0f : 0.0f;
   }
-  if (change_.unexplained_share() < kObjectShare || still < kStillShare * count) return false;
+  if (change_.unexplained_fraction() < kObjectFraction || still < kStillFraction * count) return false;
   result.object_x = (x / count + 0.5f) / float(change_.columns());
   result.object_y = (y / count + 0.5f) / float(change_.rows());
   return true;
@@ -128,12 +128,12 @@ bool HealthRules::find_object(const PictureMatch& since_rest, HealthResult& resu
 
 // The picture has rested for some frames.
 void HealthRules::name_event(const SmallPicture& picture, const PictureMatch& match, HealthResult& result) {
-  if (lost_detail(match.flat_share()) && is_covered(change_)) {
+  if (lost_detail(match.flat_fraction()) && is_covered(change_)) {
     result.event = state_ = CameraEvent::kCovered;
     return;
   }
   const float shift = std::hypot(change_.shift_x(), change_.shift_y());
-  if (change_.shift_share() >= kMovedShare && shift >= kMovedShift) {
+  if (change_.shift_fraction() >= kMovedFraction && shift >= kMovedShift) {
     result.event = CameraEvent::kMoved;
     result.shift_x = change_.shift_x();
     result.shift_y = change_.shift_y();
@@ -147,10 +147,10 @@ void HealthRules::begin_disturbance(const SmallPicture& before, const PictureMat
   calm_ = before;
   disturbed_frames_ = 1;
   disturbed_ns_ = time_ns;
-  peak_share_ = match.unexplained_share();
-  new_share_ = new_share(match);
+  peak_fraction_ = match.unexplained_fraction();
+  new_fraction_ = new_fraction(match);
   peak_shift_ = shift_of(match);
-  other_share_ = 0;
+  other_fraction_ = 0;
   rest_frames_ = 0;
 }
 
@@ -158,22 +158,23 @@ void HealthRules::begin_disturbance(const SmallPicture& before, const PictureMat
 bool HealthRules::is_much_worse(const PictureMatch& match) const {
   const float shift = shift_of(match);
   if (std::max(peak_shift_, shift) >= kJump) return peak_shift_ < kJump && shift >= kJumpRatio * peak_shift_;
-  return match.unexplained_share() >= std::max(kMinNewOfObject, kMuchWorse * std::max(peak_share_, other_share_));
+  return match.unexplained_fraction() >=
+         std::max(kMinNewOfObject, kMuchWorse * std::max(peak_fraction_, other_fraction_));
 }
 
 // One frame does not follow from the one before, but the frames before it do, and the frames after it. change_ was
 // found.
 bool HealthRules::is_cut(const PictureMatch& match) {
-  return disturbed_frames_ == 2 && peak_share_ >= kCutShare &&
-         std::max(share_before_, match.unexplained_share()) <= kAroundCut * peak_share_ &&
-         change_.unexplained_share() >= kCutShare && change_.shift_share() < kMovedShare &&
-         (peak_share_ >= kWholePicture || !is_covered(change_));
+  return disturbed_frames_ == 2 && peak_fraction_ >= kCutFraction &&
+         std::max(fraction_before_, match.unexplained_fraction()) <= kAroundCut * peak_fraction_ &&
+         change_.unexplained_fraction() >= kCutFraction && change_.shift_fraction() < kMovedFraction &&
+         (peak_fraction_ >= kWholePicture || !is_covered(change_));
 }
 
 void HealthRules::follow_disturbance(const SmallPicture& picture, const PictureMatch& match, HealthResult& result) {
   ++disturbed_frames_;
   rest_frames_ = is_calm(match) ? rest_frames_ + 1 : 0;
-  if (rest_frames_ == 0) other_share_ = std::max(other_share_, match.unexplained_share());
+  if (rest_frames_ == 0) other_fraction_ = std::max(other_fraction_, match.unexplained_fraction());
   peak_shift_ = std::max(peak_shift_, shift_of(match));
   if (rest_frames_ == 1) rest_ = picture;
   if (rest_frames_ == 1 || disturbed_frames_ == 2) change_.find(picture, calm_);
@@ -186,7 +187,8 @@ void HealthRules::follow_disturbance(const SmallPicture& picture, const PictureM
     result.began_ns = disturbed_ns_;
     forget_usual();
   }
-  if (result.event == CameraEvent::kCut || result.event == CameraEvent::kMoved) usual_flat_share_ = match.flat_share();
+  if (result.event == CameraEvent::kCut || result.event == CameraEvent::kMoved)
+    usual_flat_fraction_ = match.flat_fraction();
   if (result.event != CameraEvent::kNone || rest_frames_ == kRestFrames) {
     disturbed_frames_ = 0;
   } else if (disturbed_frames_ > kMaxDisturbedFrames) {
@@ -222,18 +224,18 @@ HealthResult HealthRules::add(const SmallPicture& picture, const SmallPicture& b
                               bool is_equal, const Brightness& brightness, int64_t time_ns) {
   HealthResult result;
   result.is_stream_start = !has_frame_;
-  result.unexplained = match.unexplained_share();
+  result.unexplained = match.unexplained_fraction();
   if (find_outage(is_equal, brightness, time_ns, result)) {
     result.state = state_;
     return result;
   }
   if (!has_frame_) {
     has_frame_ = true;
-    usual_flat_share_ = match.flat_share();
-    share_before_ = latest_share_ = 0;
+    usual_flat_fraction_ = match.flat_fraction();
+    fraction_before_ = latest_fraction_ = 0;
     return result;
   }
-  if (state_ == CameraEvent::kCovered && !lost_detail(match.flat_share())) {
+  if (state_ == CameraEvent::kCovered && !lost_detail(match.flat_fraction())) {
     state_ = CameraEvent::kNone;
     disturbed_frames_ = 0;
     forget_usual();
@@ -243,13 +245,14 @@ HealthResult HealthRules::add(const SmallPicture& picture, const SmallPicture& b
   } else if (is_unsteady_) {
     is_unsteady_ = !is_calm(match);
   } else if (disturbed_frames_ > 0 || is_disturbed(match)) {
-    share_before_ = latest_share_;
+    fraction_before_ = latest_fraction_;
     begin_disturbance(before, match, time_ns);
   }
-  latest_share_ = match.unexplained_share();
+  latest_fraction_ = match.unexplained_fraction();
   if (disturbed_frames_ == 0) {
     remember(match);
-    if (state_ != CameraEvent::kCovered) usual_flat_share_ += kUsualRate * (match.flat_share() - usual_flat_share_);
+    if (state_ != CameraEvent::kCovered)
+      usual_flat_fraction_ += kUsualRate * (match.flat_fraction() - usual_flat_fraction_);
   }
   result.state = state_;
   return result;

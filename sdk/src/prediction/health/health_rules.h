@@ -44,7 +44,7 @@ class HealthRules {
 
   bool is_disturbed(const PictureMatch& match) const;
   bool is_calm(const PictureMatch& match) const;
-  float new_share(const PictureMatch& match) const;
+  float new_fraction(const PictureMatch& match) const;
   void remember(const PictureMatch& match);
   void forget_usual();
   // Returns whether the picture is black or equal ones came, and then fills the result.
@@ -57,26 +57,27 @@ class HealthRules {
   bool is_abrupt() const;
   bool is_covered(const PictureMatch& change) const;
   bool find_object(const PictureMatch& since_rest, HealthResult& result) const;
-  bool lost_detail(float flat_share) const;
+  bool lost_detail(float flat_fraction) const;
 
   bool has_frame_ = false;
   int equal_frames_ = 0;
   int64_t equal_since_ns_ = 0;
   CameraEvent state_ = CameraEvent::kNone;
-  float usual_flat_share_ = 0;
-  SmallPicture calm_;                          // before a disturbance
-  SmallPicture rest_;                          // the first picture after it
-  PictureMatch change_;                        // of rest_ in calm_
-  PictureMatch since_rest_;                    // of a later picture in rest_
-  int disturbed_frames_ = 0;                   // 0: calm
-  int rest_frames_ = 0;                        // of these, the latest that rest
-  float peak_share_ = 0, other_share_ = 0;     // unexplained in the first disturbed frame, and the most until the rest
-  float share_before_ = 0, latest_share_ = 0;  // unexplained in the two frames before
-  float peak_shift_ = 0, new_share_ = 0;
+  float usual_flat_fraction_ = 0;
+  SmallPicture calm_;         // before a disturbance
+  SmallPicture rest_;         // the first picture after it
+  PictureMatch change_;       // of rest_ in calm_
+  PictureMatch since_rest_;   // of a later picture in rest_
+  int disturbed_frames_ = 0;  // 0: calm
+  int rest_frames_ = 0;       // of these, the latest that rest
+  float peak_fraction_ = 0,
+        other_fraction_ = 0;  // unexplained in the first disturbed frame, and the most until the rest
+  float fraction_before_ = 0, latest_fraction_ = 0;  // unexplained in the two frames before
+  float peak_shift_ = 0, new_fraction_ = 0;
   int64_t disturbed_ns_ = 0;
   bool is_unsteady_ = false;  // a disturbance did not end: nothing is said until the stream is calm
   std::array<std::vector<float>, kBefore> unexplained_;  // of the latest frames, a ring
-  std::array<float, kBefore> shares_{}, shifts_{};
+  std::array<float, kBefore> fractions_{}, shifts_{};
   size_t next_ = 0, known_ = 0;
 };
 

@@ -19,7 +19,7 @@ constexpr float kStillResidual = 4;    // squared grey levels: no motion is sear
 constexpr float kSameShift_px = 2, kFirstAgreement_px = 4;
 constexpr int kCameraPasses = 3;
 constexpr size_t kMinDetailed = 12;  // patches: fewer say nothing of the camera
-constexpr float kMinPatches = 6, kMinShiftShare = 0.3f;
+constexpr float kMinPatches = 6, kMinShiftFraction = 0.3f;
 constexpr float kDistanceCost = 0.02f;  // squared grey levels a squared pixel: of equal places the nearest
 
 int count_of(int side_px) { return std::max(divide_up(side_px - kPatch_px, kPatchStep_px), 0) + 1; }
@@ -199,13 +199,13 @@ void PictureMatch::find_camera_motion() {
   // Patches point back to where they were.
   shift_x_ = -camera_.dx / float(width_px_);
   shift_y_ = -camera_.dy / float(width_px_);
-  shift_share_ = with_detail >= kMinDetailed ? float(together) / float(with_detail) : 0;
-  explained_detail_share_ = with_detail > 0 ? float(known) / float(with_detail) : 1;
+  shift_fraction_ = with_detail >= kMinDetailed ? float(together) / float(with_detail) : 0;
+  explained_detail_fraction_ = with_detail > 0 ? float(known) / float(with_detail) : 1;
 }
 
 // Patches that the other picture does not show are not unexplained.
 void PictureMatch::leave_out_what_came_into_view() {
-  if (shift_share_ < kMinShiftShare) return;
+  if (shift_fraction_ < kMinShiftFraction) return;
   for (size_t i = 0; i < patches_.size(); ++i) {
     if (!is_in_view(i)) unexplained_[i] = std::min(unexplained_[i], 0.5f);
   }
@@ -213,9 +213,9 @@ void PictureMatch::leave_out_what_came_into_view() {
 
 void PictureMatch::find(const SmallPicture& picture, const SmallPicture& other) {
   const LumaLevel &from = picture.fine(), &to = other.fine();
-  unexplained_share_ = flat_share_ = shift_x_ = shift_y_ = shift_share_ = 0;
+  unexplained_fraction_ = flat_fraction_ = shift_x_ = shift_y_ = shift_fraction_ = 0;
   const LumaLevel &coarse_from = picture.coarse(), &coarse_to = other.coarse();
-  explained_detail_share_ = 1;
+  explained_detail_fraction_ = 1;
   camera_ = {};
   width_px_ = from.width_px;
   height_px_ = from.height_px;
@@ -247,13 +247,13 @@ void PictureMatch::find(const SmallPicture& picture, const SmallPicture& other) 
   find_camera_motion();
   leave_out_what_came_into_view();
   for (size_t i = 0; i < patches_.size(); ++i) {
-    unexplained_share_ += unexplained_[i] > 0.5f ? 1.0f : 0.0f;
+    unexplained_fraction_ += unexplained_[i] > 0.5f ? 1.0f : 0.0f;
     const int column = int(i) % columns_, row = int(i) / columns_;
     const float detail = detail_at(from, patch_begin(column, from.width_px), patch_begin(row, from.height_px));
-    flat_share_ += detail < kFlatDetail ? 1.0f : 0.0f;
+    flat_fraction_ += detail < kFlatDetail ? 1.0f : 0.0f;
   }
-  unexplained_share_ /= float(patches_.size());
-  flat_share_ /= float(patches_.size());
+  unexplained_fraction_ /= float(patches_.size());
+  flat_fraction_ /= float(patches_.size());
 }
 
 }  // namespace maq

@@ -40,16 +40,16 @@ class PictureMatch {
   // For each patch: 0 where motion explains it, 1 where nothing in the other picture is like it. [rows][columns]
   const std::vector<float>& unexplained() const { return unexplained_; }
   // The fraction of patches that motion does not explain.
-  float unexplained_share() const { return unexplained_share_; }
+  float unexplained_fraction() const { return unexplained_fraction_; }
   // The fraction of patches without detail.
-  float flat_share() const { return flat_share_; }
+  float flat_fraction() const { return flat_fraction_; }
   // How the middle of the picture moved, from the other picture to this one, in fractions of its width; and the
   // fraction of patches with detail that move so, together, as a camera that moves, rolls or zooms makes them.
   float shift_x() const { return shift_x_; }
   float shift_y() const { return shift_y_; }
-  float shift_share() const { return shift_share_; }
+  float shift_fraction() const { return shift_fraction_; }
   // The fraction of patches with detail that motion explains.
-  float explained_detail_share() const { return explained_detail_share_; }
+  float explained_detail_fraction() const { return explained_detail_fraction_; }
   // Whether a patch stays where it is, or moves with the picture.
   bool is_at_rest(size_t patch) const;
 
@@ -72,8 +72,8 @@ class PictureMatch {
   std::vector<Patch> patches_;
   std::vector<float> brightness_;  // [patches]: mean luma less that of the patch found
   std::vector<float> unexplained_, sorted_;
-  float unexplained_share_ = 0, flat_share_ = 0, shift_x_ = 0, shift_y_ = 0, shift_share_ = 0;
-  float explained_detail_share_ = 0;
+  float unexplained_fraction_ = 0, flat_fraction_ = 0, shift_x_ = 0, shift_y_ = 0, shift_fraction_ = 0;
+  float explained_detail_fraction_ = 0;
   CameraMotion camera_;
   int width_px_ = 0, height_px_ = 0;
 };

@@ -1,5 +1,5 @@
 """Measures predicted frames of clips: PSNR and SSIM by frames ahead beside the last frame and OpenCV's DIS, the error
-of the estimated motion, run times, waits and PSNR of a concealer, and the time of novelty scores.
+of the estimated motion, run times, waits and PSNR of a concealer, and the time of camera health.
 
     python -m benchmarks.prediction                         a table, build/benchmarks/prediction.json (14 minutes)
     python -m benchmarks.prediction --quick                 fewer clips, a smoke test
@@ -42,10 +42,10 @@ SIZE_PX, LARGE_PX = (320, 240), (640, 480)
 FRAMES = 90  # frames of a real clip
 WAIT_SOURCE = "stub:people?count=2&size=640x480&fps=30&drop=0.25&fault_seed=5"
 METRICS = (
-    "prediction_frames_a_second", "concealed_wait_p99_ms", "novelty_frames_a_second", *concealment.METRICS,
+    "prediction_frames_a_second", "concealed_wait_p99_ms", "camera_health_frames_a_second", *concealment.METRICS,
     *sampling.METRICS,
 )  # fmt: skip
-METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto", "network": "auto, refined"}
+METHODS = {"last": "last frame", "motion": "motion", "dis": "OpenCV DIS", "auto": "auto"}
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,10 @@ def measure(
     if pushing:
         paths = sorted(clips.glob("clip-*.npz"))[: 3 if quick else 24]
         document["motion_error_px"] = motion_error.measure(paths)
-    novelty = frames_a_second(BUNDLE, threads, 60 if quick else 200)
-    document["novelty"] = novelty
+    document["health"] = frames_a_second(60 if quick else 200)
     metrics = {
         "concealed_wait_p99_ms": waits["wait_ms"]["p99"],
-        "novelty_frames_a_second": novelty["frames_a_second"],
+        "camera_health_frames_a_second": document["health"]["frames_a_second"],
     }
     missing = {}
     if speed:
@@ -170,13 +169,13 @@ def clip_films(folder: Path, most: int) -> list[Film]:
 def measure_film(film: Film, threads: int, has_ssim: bool = False) -> dict:
     frames = np.ascontiguousarray(film.bgr)
     height, width = frames.shape[1:3]
-    words = ["errors", str(width), str(height), str(film.fps), str(threads), str(BUNDLE), *map(str, HORIZONS)]
+    words = ["errors", str(width), str(height), str(film.fps), str(threads), *map(str, HORIZONS)]
     found = json.loads(run(words, frames.tobytes()))
     dis, dis_ms = dis_errors(frames)
     for row in found["horizons"]:
         row["dis_db"] = dis[row["frames"]]
     if has_ssim:
-        for name, values in structure_of(frames, film.fps, HORIZONS, BUNDLE, threads).items():
+        for name, values in structure_of(frames, film.fps, HORIZONS, threads).items():
             for row, value in zip(found["horizons"], values, strict=True):
                 row[f"{name}_ssim"] = value
     return {"film": film.name, "size_px": [width, height], "threads": threads, "dis_ms": dis_ms, **found}
@@ -199,18 +198,17 @@ def dis_errors(frames: np.ndarray) -> tuple[dict[int, float], float]:
     return {horizon: float(np.mean(values)) for horizon, values in errors.items()}, float(np.median(times))
 
 
-def frames_a_second(bundle: Path, threads: int, frames: int = 200) -> dict[str, float]:
-    """Measures novelty scores of a simulated camera of 640 x 480: median wall-clock time, processor time, and
-    stages."""
-    novelty = maquette.Novelty(bundle_path=bundle, threads=threads)
-    stats, used_ms = [], []
+def frames_a_second(frames: int = 200) -> dict[str, float]:
+    """Measures camera health of a simulated camera of 640 x 480: median wall-clock and processor time."""
+    health = maquette.CameraHealth()
+    push_ms, used_ms = [], []
     for frame in maquette.Source(f"stub:people?count=2&size=640x480&fps=30&frames={frames}"):
         begin = time.process_time()
-        novelty.push(frame)
+        health.push(frame)
         used_ms.append(1000 * (time.process_time() - begin))
-        stats.append(novelty.stats)
-    of = {name: float(np.median([one[name] for one in stats[5:]])) for name in stats[0] if name.endswith("_ms")}
-    return {"frames_a_second": 1000 / of["push_ms"], "cpu_ms": float(np.median(used_ms[5:])), **of}
+        push_ms.append(health.stats["push_ms"])
+    median_ms = float(np.median(push_ms[5:]))
+    return {"frames_a_second": 1000 / median_ms, "push_ms": median_ms, "cpu_ms": float(np.median(used_ms[5:]))}
 
 
 def means_of(rows: list[dict]) -> dict[str, dict]:
@@ -266,8 +264,7 @@ def section(measured: dict) -> tuple[str, list]:
     waits = measured["waits"]
     parts: list = [
         "Frames predicted 1, 3, 5 and 8 frames after the latest frame: PSNR in dB (320 x 240). Motion: our optical "
-        "flow. OpenCV DIS: constant velocity by its preset medium. auto: the default of an app. Refined: auto changed "
-        "by a network (MAQ_PREDICTOR_REFINED).",
+        "flow. OpenCV DIS: constant velocity by its preset medium. auto: the default of an app.",
         table_of([], measured["sets"]) if measured["sets"] else "There were no clips.",
     ]
     structure = ssim_table(measured["sets"])
@@ -311,12 +308,12 @@ def section(measured: dict) -> tuple[str, list]:
             "Concealed gaps of up to 300 ms, PSNR in dB over their frames: last frame repeated / predicted frames."
         )
         parts.append(concealment.table_of({name: np.array(rows) for name, rows in measured["concealment"].items()}))
-    novelty = measured["novelty"]
-    parts.append(
-        f"Novelty score with its map, frames of 640 x 480: {novelty['frames_a_second']:.0f} a second, "
-        f"{novelty['cpu_ms']:.1f} ms of processor time a frame (resizing {novelty['resize_ms']:.1f}, network "
-        f"{novelty['network_ms']:.1f}, nearest codebook entries {novelty['nearest_ms']:.1f} ms)."
-    )
+    if "health" in measured:  # an older document has none
+        health = measured["health"]
+        parts.append(
+            f"Camera health, frames of 640 x 480: {health['frames_a_second']:.0f} a second, {health['push_ms']:.1f} ms "
+            f"and {health['cpu_ms']:.1f} ms of processor time a frame."
+        )
     if measured.get("sampling"):
         parts += sampling_tables(measured["sampling"])
     parts += [f"Not measured: {'; '.join(measured['missing'])}."] if measured["missing"] else []

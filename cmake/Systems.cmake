@@ -5,7 +5,7 @@ option(MAQ_WITH_DENSEPOSE "Dense pose of people" ON)
 option(MAQ_WITH_SCENES "Captures and scenes" ON)
 option(MAQ_WITH_EDGES "Edges and curves in depth" ON)
 option(MAQ_WITH_HEADS "Heads from photos" ON)
-option(MAQ_WITH_PREDICTION "Prediction of frames, novelty, concealment of gaps" ON)
+option(MAQ_WITH_PREDICTION "Prediction of frames, camera health, concealment of gaps" ON)
 option(MAQ_WITH_BODY "Bodies of people: pose, shape and mesh" ON)
 
 # For each system: its folders in sdk/src, its models, and patterns of its files in sdk/src/api, of its public headers and
@@ -34,12 +34,12 @@ set(MAQ_HEADS_API "head/.*")
 set(MAQ_HEADS_HEADERS "head.*")
 set(MAQ_HEADS_EXPORTS "maq_head_.*")
 
-set(_names "concealer|novelty|prediction|predictor")
+set(_names "camera_event|camera_health|concealer|prediction|predictor")
 set(MAQ_PREDICTION_FOLDERS prediction concealment)
 set(MAQ_PREDICTION_MODELS prediction-int8)
 set(MAQ_PREDICTION_API "prediction/.*")
 set(MAQ_PREDICTION_HEADERS "(${_names}).*")
-set(MAQ_PREDICTION_EXPORTS "maq_(${_names})_.*|maq_pipeline_result_get_(novelty|predicted_frame)")
+set(MAQ_PREDICTION_EXPORTS "maq_(${_names})_.*|maq_pipeline_result_get_(camera_health|predicted_frame)")
 
 set(MAQ_BODY_FOLDERS body)
 set(MAQ_BODY_MODELS body)

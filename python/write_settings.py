@@ -26,7 +26,6 @@ SETTINGS = {
     "CurvesSettings": ("maq_edges_curves_config", ()),
     "EdgesFusionSettings": ("maq_edges_fusion_config", ()),
     "PredictorSettings": ("maq_predictor_config", ("method", "shared_with")),
-    "NoveltySettings": ("maq_novelty_config", ("method", "shared_with")),
     "ConcealerSettings": ("maq_concealer_config", ("max_gap_ms", "method")),
     "SceneBuildSettings": ("maq_scene_build_config", ("points",)),
     "DenseCloudSettings": ("maq_dense_cloud_config", ()),
@@ -38,7 +37,6 @@ SETTINGS = {
 ENUMS = {
     "PartColours": "maq_densepose_colours",
     "HeadShading": "maq_head_shading",
-    "NoveltyMethod": "maq_novelty_method",
     "PredictorMethod": "maq_predictor_method",
     "SourceControl": "maq_source_control",
 }

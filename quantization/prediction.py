@@ -3,9 +3,8 @@
     python -m quantization.prediction --fp32 .data/bundles/prediction-fp32 --out .data/bundles/prediction-int8
 
 `quantization/prediction.toml` lists layers that stay float; `quantization/transformer.py` quantizes the transformer.
-Afterwards, `python -m quantization.prediction_refiner` adds the refiner. The command prints sizes, the signal-to-noise
-ratio of each output, and the cost of int8 on frames of validation clips: the fraction of equal codes, the PSNR of
-reconstructed frames, and the transformer's bits a code.
+The command prints sizes, the signal-to-noise ratio of each output, and the cost of int8 on frames of validation clips:
+the fraction of equal codes, the PSNR of reconstructed frames, and the transformer's bits a code.
 """
 
 from __future__ import annotations
@@ -25,8 +24,7 @@ from export.prediction.bundle import CODES, GRAPHS, TRANSFORMER, write_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.codes import read_codes
 from export.prediction.data import read_clips
-from export.prediction.refiner.image_error import psnr_db
-from export.prediction.refiner.refiner_graph import REFINED
+from export.prediction.image_error import psnr_db
 from quantization.quantize import int8_info, quantize_graphs
 from quantization.samples import Sample
 from quantization.settings import PREDICTION, PredictionSettings, read_settings
@@ -120,8 +118,7 @@ def main() -> None:
     quality, measured = kept_images(options) if options.keep else quantized_images(options, settings)
     print(", ".join(f"{name} {value}" for name, value in measured.items()))
     shutil.copyfile(options.fp32 / CODES, options.out / CODES)
-    for name in (TRANSFORMER, f"{REFINED}.onnx"):  # of an earlier bundle
-        (options.out / name).unlink(missing_ok=True)
+    (options.out / TRANSFORMER).unlink(missing_ok=True)  # of an earlier bundle
     if (options.fp32 / TRANSFORMER).exists():
         calibrating = read_codes(options.codes, "train")
         quantize_transformer(options.fp32, options.out, calibrating, settings.frames)

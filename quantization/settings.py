@@ -43,7 +43,7 @@ class GraphSettings:
 
 @dataclass(frozen=True)
 class DensePoseSettings:
-    """graphs: settings by graph name, also of graphs that only some bundles have. calibration_images,
+    """graphs: settings by graph name. calibration_images,
     calibration_photos, held_out_images: how many images and photographs set the ranges, and how many images measure
     the error. people_per_image: at most so many people of an image calibrate the dense head.
     """
@@ -96,10 +96,10 @@ class HeadSettings:
 
 @dataclass(frozen=True)
 class PredictionSettings:
-    """graphs: settings by graph name, also of graphs that only some bundles have. frames, held_out_frames: how many
+    """graphs: settings by graph name. frames, held_out_frames: how many
     frames calibrate, and measure the error."""
 
-    GRAPHS: ClassVar[tuple[str, ...]] = (*prediction.GRAPHS, prediction.REFINED)
+    GRAPHS: ClassVar[tuple[str, ...]] = prediction.GRAPHS
 
     graphs: dict[str, GraphSettings]
     frames: int

@@ -30,11 +30,16 @@ printf '\n== maquette body tests/media/clip.mp4 --out %s/body.glb --bvh %s/body.
 printf '\n== maquette head tests/media/photo.jpg --out %s/head.glb --preview %s/head_turning.mp4\n' "$out" "$out"
 "$maquette" head tests/media/photo.jpg --out "$out/head.glb" --preview "$out/head_turning.mp4"
 
-# Predicts the next frames of the clip, next to the real ones, and scores the novelty of each frame.
+# Predicts the next frames of the clip, next to the real ones, and puts an event of each kind into it, which camera health names.
 printf '\n== maquette predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out %s/next.mp4\n' "$out"
 "$maquette" predict tests/media/clip.mp4 --from 15 --frames 30 --compare --out "$out/next.mp4"
-printf '\n== maquette novelty tests/media/clip.mp4 --out %s/novelty.mp4\n' "$out"
-"$maquette" novelty tests/media/clip.mp4 --out "$out/novelty.mp4"
+printf '\n== maquette health tests/media/clip.mp4 --out %s/health.mp4\n' "$out"
+"$maquette" health tests/media/clip.mp4 --out "$out/health.mp4"
+if .venv/bin/python -c 'import cv2, cffi' 2>/dev/null; then
+    printf '\n== python -m benchmarks.camera_health.strip tests/media/clip.mp4 --out %s/health_events.png\n' "$out"
+    PYTHONPATH=.:python .venv/bin/python -m benchmarks.camera_health.strip tests/media/clip.mp4 \
+        --other tests/media/photo.jpg --out "$out/health_events.png"
+fi
 
 # The edges of a carton that a depth camera sees, and its size beside the true one.
 depth='image:tests/media/box_depth.png?depth_unit=0.001&fx=600'
@@ -105,6 +110,6 @@ if fetch_real; then
 fi
 
 printf '\nPictures to look at, in %s:\n' "$out"
-find "$out" -name '*_overlay.*' -o -name '*.mp4' | sort | sed 's/^/  /'
+find "$out" -name '*_overlay.*' -o -name '*.mp4' -o -name 'health_events.png' | sort | sed 's/^/  /'
 printf 'Beside them: <stem>_IUV.png, <stem>_INDS.png and <stem>.json of every frame (docs/reference/formats.md); <place>.maqs, scenes;\n'
 printf 'box_depth_distance.png and box_depth_kind.png, the field of edges; box_depth_curves.step, .dxf and .json, its curves; head.glb.\n'

@@ -100,7 +100,7 @@ def main() -> None:
         keep("desktop-head.jpg", sheet([run(PHOTO, "--head", *h)[44:756, :950] for h in HEADS], 3, 520))
         keep("desktop-demo-next.jpg", bridged(Path(temporary)))
         progress.update()
-        keep("desktop-demo-surprise.jpg", run((with_a_jump(Path(temporary)), 41), "--predict", "--novelty"))
+        keep("desktop-demo-health.jpg", run((with_a_jump(Path(temporary)), 41), "--predict", "--health"))
         keep("desktop-demo-uncertainty.jpg", run((CLIP[0], 40), "--predict", "--entropy", "--sample", "--ahead", "300"))
         keep("desktop-demo-edges.jpg", run(SOLIDS, "--edges", *POINTER))
 

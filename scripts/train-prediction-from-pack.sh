@@ -4,12 +4,11 @@
 #
 #     scripts/train-prediction-from-pack.sh prediction.pack OUT
 #
-# It makes collages of the pack's photographs, then trains the autoencoder beside the convolutional network, writes codes,
-# and trains the transformer beside the network that refines the prediction of `auto`. It copies weights (half
-# precision, except the autoencoder's), logs and curves to OUT.
+# It makes collages of the pack's photographs, trains the autoencoder, writes codes, and trains the transformer. It copies
+# weights (half precision, except the autoencoder's), logs and curves to OUT.
 #
 # Environment: WORK (/dev/shm/maquette-prediction), SECONDS_LEFT for all (560), PERCENT of the collages, the batches and
-# the validation (100), PROCESSES for motion and the predictions of `auto` (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
+# the validation (100), PROCESSES for motion (5), PYTHON (python3, with torch, OpenCV, cffi), MAQ_LIBRARY (the SDK's).
 set -eu
 [ $# = 2 ] || { sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' "$0"; exit 2; }
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -37,28 +36,14 @@ for counts in "train 2500" "val 32"; do
     --processes "${PROCESSES:-5}"
 done
 sets="pushing shapes collages"
-"$python" -m export.prediction.refiner.train_convolutional --sets $sets --minutes "$(spare 0.55)" --bf16 --batch "$(part 256)" --rate 1e-3 \
-  --validate-frames "$(part 256)" --validate-minutes 3 >convolutional.log 2>&1 &
-convolutional=$!
 "$python" -m export.prediction.train_autoencoder --sets $sets --minutes "$(spare 0.24)" --batch "$(part 256)" --rate 1e-3 \
   --stills .data/backgrounds/train --validate-minutes 100
 keep prediction-autoencoder autoencoder
 "$python" -m export.prediction.codes --sets $sets --processes "${PROCESSES:-5}"
-for split in train val; do
-  "$python" -m export.prediction.refiner.auto_predictions --sets $sets --split $split --processes "${PROCESSES:-5}"
-done
 minutes=$(spare 0.95)
-"$python" -m export.prediction.refiner.train_convolutional --sets $sets --predictions .data/prediction/auto \
-  --out .data/runs/prediction-refiner --minutes "$minutes" --bf16 --batch "$(part 256)" --rate 1e-3 --validate-frames "$(part 256)" --validate-minutes 3 \
-  >refiner.log 2>&1 &
-refiner=$!
 "$python" -m export.prediction.train_transformer --minutes "$minutes" --bf16 --batch "$(part 128)" --rate 1e-3 \
   --validate-frames "$(part 256)" --validate-minutes 3
-wait "$convolutional" || echo "the convolutional network failed" >&2
-wait "$refiner" || echo "the refiner failed" >&2
-tail -n 3 convolutional.log refiner.log
-for name in transformer convolutional refiner; do keep "prediction-$name" "$name"; done
-cp convolutional.log refiner.log "$out/"
+keep prediction-transformer transformer
 "$python" - "$out" <<'HALF'
 import sys
 from pathlib import Path

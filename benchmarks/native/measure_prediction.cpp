@@ -1,7 +1,7 @@
 // Measures predicted frames of a clip and their time, and the delay of predicted frames of a concealer
 // (benchmarks/prediction.py).
 //
-//   measure_prediction errors WIDTH HEIGHT FPS THREADS BUNDLE HORIZON... < frames    BGR, rows without padding
+//   measure_prediction errors WIDTH HEIGHT FPS THREADS HORIZON... < frames    BGR, rows without padding
 //   measure_prediction waits SECONDS URI
 #include <algorithm>
 #include <cmath>
@@ -49,13 +49,11 @@ maquette::Frame frame_of(const maquette::Context& context, const Pixels& pixels,
 }
 
 struct Sums {
-  double last_db = 0, motion_db = 0, auto_db = 0, network_db = 0;
+  double last_db = 0, motion_db = 0, auto_db = 0;
   double motion_fraction = 0;  // in the blend of auto
 };
 
-// bundle: folder of the refining network.
-int measure_errors(int width, int height, double fps, int threads, const char* bundle,
-                   const std::vector<size_t>& horizons) {
+int measure_errors(int width, int height, double fps, int threads, const std::vector<size_t>& horizons) {
   std::vector<Pixels> frames;
   for (;;) {
     Pixels pixels(size_t(width) * size_t(height) * 3);
@@ -68,12 +66,9 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
   maquette::Predictor automatic(context, config);
   config.method = MAQ_PREDICTOR_MOTION;
   maquette::Predictor motion(context, config);
-  config.method = MAQ_PREDICTOR_REFINED;
-  config.model.bundle_path = bundle;
-  maquette::Predictor refined(context, config);
   const size_t farthest = *std::max_element(horizons.begin(), horizons.end());
   std::vector<Sums> sums(horizons.size());
-  std::vector<double> push_ms, auto_push_ms, predict_ms, network_ms, push_cpu_ms, predict_cpu_ms;
+  std::vector<double> push_ms, auto_push_ms, predict_ms, push_cpu_ms, predict_cpu_ms;
   Pixels predicted(size_t(width) * size_t(height) * 3);
   int starts = 0;
   for (size_t i = 0; i + farthest < frames.size(); ++i) {
@@ -82,7 +77,6 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
     motion.push(frame);
     const double after_push_ms = processor_ms();
     automatic.push(frame);
-    refined.push(frame);
     if (i < kFirstStart) continue;
     push_cpu_ms.push_back(after_push_ms - before_push_ms);
     push_ms.push_back(double(motion.stats().push_ms));
@@ -102,22 +96,19 @@ int measure_errors(int width, int height, double fps, int threads, const char* b
       automatic.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
       sums[k].motion_fraction += double(automatic.stats().motion_fraction);
       sums[k].auto_db += psnr_db(predicted, truth);
-      refined.predict(ahead_s).copy_pixels(MAQ_PIXEL_BGR8, predicted.data(), 0, predicted.size());
-      network_ms.push_back(double(refined.stats().networks_ms));
-      sums[k].network_db += psnr_db(predicted, truth);
     }
   }
   std::printf(
-      "{\"starts\": %d, \"push_ms\": %.4f, \"auto_push_ms\": %.4f, \"predict_ms\": %.4f, \"network_ms\": %.4f, "
+      "{\"starts\": %d, \"push_ms\": %.4f, \"auto_push_ms\": %.4f, \"predict_ms\": %.4f, "
       "\"cpu_ms\": %.4f, \"horizons\": [",
-      starts, quantile(push_ms, .5), quantile(auto_push_ms, .5), quantile(predict_ms, .5), quantile(network_ms, .5),
+      starts, quantile(push_ms, .5), quantile(auto_push_ms, .5), quantile(predict_ms, .5),
       quantile(push_cpu_ms, .5) + quantile(predict_cpu_ms, .5));
   for (size_t k = 0; k < horizons.size(); ++k) {
     std::printf(
-        "%s{\"frames\": %zu, \"last_db\": %.4f, \"motion_db\": %.4f, \"auto_db\": %.4f, \"network_db\": %.4f, "
+        "%s{\"frames\": %zu, \"last_db\": %.4f, \"motion_db\": %.4f, \"auto_db\": %.4f, "
         "\"motion_fraction\": %.4f}",
         k == 0 ? "" : ", ", horizons[k], sums[k].last_db / starts, sums[k].motion_db / starts, sums[k].auto_db / starts,
-        sums[k].network_db / starts, sums[k].motion_fraction / starts);
+        sums[k].motion_fraction / starts);
   }
   std::printf("]}\n");
   return 0;
@@ -149,14 +140,13 @@ int measure_waits(double seconds, const std::string& uri) {
 
 int main(int argc, char** argv) try {
   if (argc == 4 && std::strcmp(argv[1], "waits") == 0) return measure_waits(std::atof(argv[2]), argv[3]);
-  if (argc > 7 && std::strcmp(argv[1], "errors") == 0) {
+  if (argc > 6 && std::strcmp(argv[1], "errors") == 0) {
     std::vector<size_t> horizons;
-    for (int i = 7; i < argc; ++i) horizons.push_back(size_t(std::atoi(argv[i])));
-    return measure_errors(std::atoi(argv[2]), std::atoi(argv[3]), std::atof(argv[4]), std::atoi(argv[5]), argv[6],
-                          horizons);
+    for (int i = 6; i < argc; ++i) horizons.push_back(size_t(std::atoi(argv[i])));
+    return measure_errors(std::atoi(argv[2]), std::atoi(argv[3]), std::atof(argv[4]), std::atoi(argv[5]), horizons);
   }
   std::fprintf(stderr,
-               "usage: measure_prediction errors WIDTH HEIGHT FPS THREADS BUNDLE HORIZON... < frames\n"
+               "usage: measure_prediction errors WIDTH HEIGHT FPS THREADS HORIZON... < frames\n"
                "       measure_prediction waits SECONDS URI\n");
   return 2;
 } catch (const std::exception& error) {

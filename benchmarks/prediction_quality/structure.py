@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import maquette
 import numpy as np
@@ -15,13 +14,9 @@ from export.scenes.image_quality import ssim
 START_STEP_OF_SSIM = 2 * START_STEP  # SSIM takes longer than the predictions
 
 
-def structure_of(
-    bgr: np.ndarray, fps: float, horizons: Sequence[int], bundle: Path, threads: int = 1
-) -> dict[str, list[float]]:
-    """Returns the mean SSIM by method and frames ahead, for frames BGR uint8 [T, H, W, 3]. bundle: has the refining
-    network."""
+def structure_of(bgr: np.ndarray, fps: float, horizons: Sequence[int], threads: int = 1) -> dict[str, list[float]]:
+    """Returns the mean SSIM by method and frames ahead, for frames BGR uint8 [T, H, W, 3]."""
     predictors = {name: maquette.Predictor(name, threads=threads) for name in ("last", "motion", "auto")}
-    predictors["network"] = maquette.Predictor("refined", bundle_path=bundle, threads=threads)
     rgb = np.ascontiguousarray(bgr[..., ::-1])
     dis = Dis(*bgr.shape[1:3])
     found: dict[str, list[list[float]]] = {name: [] for name in (*predictors, "dis")}

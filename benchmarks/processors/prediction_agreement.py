@@ -1,8 +1,8 @@
-"""Compares the novelty scores and the likeliest next frames of this processor with emulated ones (qemu).
+"""Compares camera health and the likeliest next frames of this processor with emulated ones (qemu).
 
-It compares bits of the first frames of a stream, and images that the shipped networks decode at temperature 0, on
-x86-64 with AVX2 but without VNNI, and on aarch64 without and with the dot product and matrix instructions. Needs both
-builds and Debian's qemu-user; `make test-isa` makes them and runs this.
+It compares what motion leaves unexplained in the first frames of a stream, and images that the shipped networks decode
+at temperature 0, on x86-64 with AVX2 but without VNNI, and on aarch64 without and with the dot product and matrix
+instructions. Needs both builds and Debian's qemu-user; `make test-isa` makes them and runs this.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ FROM, SAMPLED = 5, 2  # the last observed frame, and the frames predicted after 
 CELLS = 16  # cells a side of a frame of codes
 MAX_LEVELS = 1  # accepted difference of pixels in cells with equal codes
 BAR = 0.99  # fraction of cells
-MAX_BITS = 0.01  # accepted relative difference of the bits of a frame
+MAX_UNEXPLAINED = 0.01  # accepted difference of the unexplained fraction of a frame
 
 
 @dataclass(frozen=True)
 class PredictionAgreement:
     """Agreement of two folders of results."""
 
-    frames: int  # frames with compared scores
-    worst_bits: float  # largest difference of a frame's bits, relative to the bits here
+    frames: int  # frames whose camera was checked
+    worst: float  # largest difference of the unexplained fraction of a frame
     same_events: bool
     same_cells: float  # fraction of cells with the same codes
 
     def passes(self, bar: float) -> bool:
-        return self.same_cells >= bar and self.worst_bits <= MAX_BITS and self.same_events
+        return self.same_cells >= bar and self.worst <= MAX_UNEXPLAINED and self.same_events
 
 
-def read_novelty(folder: Path) -> list[dict]:
-    return [json.loads(line) for line in (folder / "novelty.json").read_text().splitlines()]
+def read_health(folder: Path) -> list[dict]:
+    return [json.loads(line) for line in (folder / "health.json").read_text().splitlines()]
 
 
 def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -56,25 +56,27 @@ def same_cells(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def compare(reference: Path, other: Path) -> PredictionAgreement:
     """Compares two folders of results. Raises ValueError if they are not of the same frames, or have none."""
-    ours, theirs = read_novelty(reference), read_novelty(other)
+    ours, theirs = read_health(reference), read_health(other)
     names, others = (sorted(path.name for path in folder.glob("*.png")) for folder in (reference, other))
     if not ours or not names or len(ours) != len(theirs) or names != others:
         raise ValueError(
             f"{reference} has {len(ours)} frames and {len(names)} images, {other} {len(theirs)} and {len(others)}."
         )
-    differences = [abs(a["bits"] - b["bits"]) / a["bits"] for a, b in zip(ours, theirs, strict=True)]
-    flags = [[frame[name] for frame in found for name in ("event", "cut", "stream_start")] for found in (ours, theirs)]
+    differences = [abs(a["unexplained"] - b["unexplained"]) for a, b in zip(ours, theirs, strict=True)]
+    flags = [
+        [frame[name] for frame in found for name in ("event", "state", "stream_start")] for found in (ours, theirs)
+    ]
     cells = [same_cells(*(cv2.imread(str(folder / name)) for folder in (reference, other))) for name in names]
     return PredictionAgreement(len(ours), max(differences), flags[0] == flags[1], float(np.mean(cells)))
 
 
 def run(processor: Processor, bundle: Path, out: Path) -> None:
-    """Writes novelty scores and predicted frames into `out`, which is emptied first. Raises ValueError with the
+    """Writes camera health and predicted frames into `out`, which is emptied first. Raises ValueError with the
     failure."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     settings = ["--bundle", str(bundle), "--threads", "1"]
-    (out / "novelty.json").write_text(run_maquette(processor, ["novelty", SOURCE, "--json", *settings]))
+    (out / "health.json").write_text(run_maquette(processor, ["health", SOURCE, "--json"]))
     sampling = ["--samples", "1", "--temperature", "0", "--from", str(FROM)]
     sampling += ["--frames", str(SAMPLED), "--out", str(out)]
     run_maquette(processor, ["predict", SOURCE, *sampling, *settings])
@@ -83,14 +85,14 @@ def run(processor: Processor, bundle: Path, out: Path) -> None:
 def print_table(bundle: Path, results: dict[str, PredictionAgreement | str], bar: float) -> None:
     table = Table(title=f"Prediction by {bundle.name} against that on this processor", title_justify="left")
     table.add_column("processor", no_wrap=True)
-    for column in ("frames", "bits, worst, %", "events", "equal cells, %", "bar"):
+    for column in ("frames", "unexplained, worst, %", "events", "equal cells, %", "bar"):
         table.add_column(column, justify="right")
     for name, found in results.items():
         if isinstance(found, str):
             table.add_row(name, *["-"] * 4, "failed")
             continue
         events = "the same" if found.same_events else "others"
-        metrics = (str(found.frames), f"{100 * found.worst_bits:.3f}", events, f"{100 * found.same_cells:.2f}")
+        metrics = (str(found.frames), f"{100 * found.worst:.3f}", events, f"{100 * found.same_cells:.2f}")
         table.add_row(name, *metrics, "held" if found.passes(bar) else "missed")
     Console(width=110).print(table)
 
@@ -100,9 +102,9 @@ def failure_of(found: PredictionAgreement | str, bar: float) -> str | None:
     if isinstance(found, str) or found.passes(bar):
         return found if isinstance(found, str) else None
     return (
-        f"{100 * found.same_cells:.2f} % of the cells are equal; at least {100 * bar:g} % are required; bits "
-        f"differ by up to {100 * found.worst_bits:.3f} %, where {100 * MAX_BITS:g} % are allowed; events are "
-        f"{'the same' if found.same_events else 'others'}."
+        f"{100 * found.same_cells:.2f} % of the cells are equal; at least {100 * bar:g} % are required; "
+        f"unexplained fractions differ by up to {100 * found.worst:.3f} %, where {100 * MAX_UNEXPLAINED:g} % "
+        f"are allowed; events are {'the same' if found.same_events else 'others'}."
     )
 
 

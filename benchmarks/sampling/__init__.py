@@ -3,9 +3,7 @@
 OF_TIMES = ("four_samples_times", "sampled_frames_a_second")
 METRICS = (
     "sampled_mean_gain_db",
-    "refined_gain_db",
     "uncertainty_rank",
     "sampled_frechet_ratio",
-    "refined_frechet_ratio",
     *OF_TIMES,
 )

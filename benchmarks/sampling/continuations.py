@@ -58,7 +58,6 @@ def methods(bundle: Path, samples: int) -> dict[str, Method]:
         "last frame": predicted("last"),
         "motion": predicted("motion"),
         "auto": predicted("auto"),
-        "auto, refined": predicted("refined", bundle_path=bundle),
         "likeliest": sampled(1, bundle, temperature=0),
         **{f"temperature {value:g}": sampled(4, bundle, temperature=value) for value in TEMPERATURES},
         "temperature 1": sampled(samples, bundle, temperature=1),

@@ -1,4 +1,4 @@
-"""Measures sampled and refined frames: PSNR, uncertainty, realism and time."""
+"""Measures sampled frames: PSNR, uncertainty, realism and time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.sampling import frechet, times, uncertainty
 from benchmarks.sampling.continuations import GIVEN, MADE, SAMPLES, continued
 from export.clips.clip import clip_paths, read_rgb
 from export.prediction.data import Clips, read_clips
-from export.prediction.refiner.image_error import psnr_db
+from export.prediction.image_error import psnr_db
 
 AHEAD = (1, 2, 4, 8, 11)  # frames ahead in the tables
 FAR = slice(4, MADE)  # 5 to 11 frames ahead
@@ -102,10 +102,7 @@ def measure_images(
     document["gain_db"] = gained
     for name, own in decibels.items():
         document["psnr_db"][name] = [float(own[:, k - 1].mean()) for k in AHEAD]
-    metrics = {
-        "sampled_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"],
-        "refined_gain_db": gained["auto, refined"],
-    }
+    metrics = {"sampled_mean_gain_db": gained[f"temperature 1, mean of {min(samples, 8)}"]}
     for name, (uncertain, errors) in uncertainties(clips, images, bits).items():
         each = uncertainty.by_frame(uncertain, errors)
         document["rank"][name] = [float(each[:, k - 1].mean()) for k in AHEAD] + [float(each.mean())]
@@ -113,7 +110,6 @@ def measure_images(
     metrics["uncertainty_rank"] = document["rank"]["mean of samples, their bits"][-1]
     document["frechet"] = frechet_ratios(images, truth, others)
     metrics["sampled_frechet_ratio"] = document["frechet"]["changes"]["temperature 1"]
-    metrics["refined_frechet_ratio"] = document["frechet"]["changes"]["auto, refined"]
     return document, metrics
 
 

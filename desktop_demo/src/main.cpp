@@ -38,7 +38,7 @@ int main(int argc, char** argv) try {
 
   CLI::App cli(
       "Shows the body surface of the people in front of a camera, live, on the CPU. Other views fly through scenes,\n"
-      "show sharp edges in depth, make 3D heads, predict frames of a camera, and score the novelty of frames.\n\n"
+      "show sharp edges in depth, make 3D heads, predict frames, and check the camera.\n\n"
       "  maquette-demo                       the first camera that works; without one, rendered people\n"
       "  maquette-demo clip.mp4              a photo, a clip, a recording, a scene (.maqs) or a capture's folder\n"
       "  maquette-demo --source 'stub:people?unplug=3s@5s'     any source of the SDK: see `maquette sources`\n"
@@ -49,7 +49,7 @@ int main(int argc, char** argv) try {
       "  maquette-demo --predict             now, and the predicted frame 200 ms later (--ahead)\n"
       "  maquette-demo --predict --conceal 'stub:people?stall=300ms@3s'\n"
       "                                      predicted frames, marked in magenta, while the camera stalls\n"
-      "  maquette-demo --predict --novelty   also the novelty of each frame: map, curve and events\n"
+      "  maquette-demo --predict --health    also camera health: cuts, freezes, black, covered, moved\n"
       "  xvfb-run -a maquette-demo clip.mp4 --view contours --headless --frames 30 --screenshot out.png\n\n"
       "In the window F1 shows the keys. Files can be dropped on it.",
       "maquette-demo");
@@ -79,22 +79,19 @@ int main(int argc, char** argv) try {
       ->capture_default_str()
       ->needs(predict)
       ->check(CLI::Range(kMinAheadMs, kMaxAheadMs));
-  cli.add_option("--method", method,
-                 "Method of prediction. auto: last and motion, blended by their past errors; refined: auto, refined "
-                 "by a network")
+  cli.add_option("--method", method, "Method of prediction. auto: last and motion, blended by their past errors")
       ->capture_default_str()
       ->needs(predict)
       ->check(CLI::IsMember(kMethodNames));
   cli.add_flag("--conceal", options.prediction.conceals_gaps,
                "Fill gaps of at most 300 ms with predicted frames, which are marked")
       ->needs(predict);
-  cli.add_flag("--novelty", options.prediction.scores_novelty, "Show the novelty of each frame: map, curve and events")
+  cli.add_flag("--health", options.prediction.checks_camera, "Show camera health: map, curve and events")
       ->needs(predict);
   cli.add_flag("--entropy", options.prediction.shows_entropy, "Show uncertain cells of the predicted frame in red")
       ->needs(predict);
   cli.add_flag("--sample", options.prediction.shows_sample, "Also show one sampled future")->needs(predict);
-  cli.add_option("--prediction-bundle", options.prediction.bundle,
-                 "Folder of the networks for novelty, entropy, samples and --method refined");
+  cli.add_option("--prediction-bundle", options.prediction.bundle, "Folder of the networks for entropy and samples");
   cli.add_option("--view", view, "View at the start")->capture_default_str()->check(CLI::IsMember(kViewNames));
   cli.add_flag("--mesh,!--no-mesh", options.mesh, "Show the template body in the corner");
   cli.add_flag("--person-colours,!--no-person-colours", options.person_colours,

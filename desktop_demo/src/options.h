@@ -22,7 +22,7 @@ constexpr std::array<const char*, 3> kCompareNames = {"none", "slider", "error"}
 constexpr std::array<const char*, 5> kShadingNames = {"colour", "shape", "normals", "template", "depth"};
 
 // In the order of maq_predictor_method.
-constexpr std::array<const char*, 4> kMethodNames = {"auto", "last", "motion", "refined"};
+constexpr std::array<const char*, 3> kMethodNames = {"auto", "last", "motion"};
 constexpr double kMinAheadMs = 33, kMaxAheadMs = 1000;
 
 struct Options {

@@ -54,7 +54,7 @@ void Panel::draw_help(bool* is_open) const {
       {"F5", "edges of a depth camera; again: people"},
       {"1 to 3, C, B, K", "edges: depth, distance, plain; curves, boxes; planes are skipped"},
       {"F7", "prediction: the source and its predicted frame; again: people"},
-      {"1 to 4, B, S, arrows", "prediction: auto, last, motion, refined; conceal gaps; novelty; time ahead (or drag)"},
+      {"1 to 3, B, S, arrows", "prediction: auto, last, motion; conceal gaps; camera health; time ahead (or drag)"},
       {"U, D", "prediction: entropy in red; one sampled future"},
       {"F6", "into the panel: arrows, Space, Enter; again: back to the picture"},
       {"H, F11", "panel, full screen"},

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "drawing/novelty_drawing.h"
+#include "drawing/health_drawing.h"
 
 namespace {
 
@@ -16,7 +16,8 @@ constexpr OwnSources kPredictedSources = {kFirstCamera, kFirstCamera, "stub:peop
 constexpr const char* kPredictionStages[] = {"luma", "flow", "weights", "project", "warp", "wait", "network"};
 constexpr float kCurveHeight = 90;
 constexpr double kAheadSPerRadian = 0.3;  // drags and arrows turn something in other views
-constexpr Reddening kNoveltyRed = {1, 8, 0.7f}, kEntropyRed = {1, 6, 0.6f};
+constexpr Reddening kUnexplainedRed = {0.3f, 0.8f, 0.7f}, kEntropyRed = {1, 6, 0.6f};
+constexpr int kEntropyCells = 16;  // a side
 constexpr ImU32 kPredictedColour = IM_COL32(255, 0, 255, 255), kDarkColour = IM_COL32(20, 20, 24, 220);
 
 }  // namespace
@@ -52,9 +53,9 @@ bool PredictionView::update() {
 }
 
 Action PredictionView::press(int key) {
-  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_4) choice_.method = maq_predictor_method(key - GLFW_KEY_1);
+  if (key >= GLFW_KEY_1 && key <= GLFW_KEY_3) choice_.method = maq_predictor_method(key - GLFW_KEY_1);
   if (key == GLFW_KEY_B) choice_.conceals_gaps = !choice_.conceals_gaps;
-  if (key == GLFW_KEY_S) choice_.scores_novelty = !choice_.scores_novelty;
+  if (key == GLFW_KEY_S) choice_.checks_camera = !choice_.checks_camera;
   if (key == GLFW_KEY_U) choice_.shows_entropy = !choice_.shows_entropy;
   if (key == GLFW_KEY_D) choice_.shows_sample = !choice_.shows_sample;
   live_.set_choice(choice_);
@@ -68,9 +69,9 @@ void PredictionView::steer(const Steering& steering, const Rect&) {
   live_.set_choice(choice_);
 }
 
-// Uses the number of columns that makes the images largest; the novelty curve is below.
+// Uses the number of columns that makes the images largest; the curve of camera health is below.
 void PredictionView::place(Rect area) {
-  const int curve_height = choice_.scores_novelty ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
+  const int curve_height = choice_.checks_camera ? std::min(int(kCurveHeight * window_.scale()), area.height / 4) : 0;
   area.height -= curve_height;
   const maquette::Tiling one = maquette::tile(choice_.shows_sample ? 3 : 2, area.width, area.height,
                                               frame().now.width_px, frame().now.height_px);
@@ -91,17 +92,16 @@ void PredictionView::draw(const Rect& area) {
   painter_.draw_scene(now_rect_, 1);
   painter_.draw_scene(next_rect_, 0);
   const bool is_concealed = frame().origin.kind == MAQ_FRAME_PREDICTED;
-  if (choice_.scores_novelty && !frame().novelty.empty()) {
-    const bool is_stream_start = frame().novelty.back().score.is_stream_start != 0;  // scored by another prior
-    if (!is_stream_start) draw_red_cells(frame().novelty_bits, kNoveltyRed, now_rect_);
-    draw_novelty_curve(frame().novelty, curve_rect_, window_.scale());
+  if (choice_.checks_camera && !frame().health.empty()) {
+    draw_red_cells(frame().health_map, frame().health.back().result.columns, kUnexplainedRed, now_rect_);
+    draw_health_curve(frame().health, curve_rect_, window_.scale());
   }
   const std::string ahead_ms = std::to_string(frame().origin.horizon_ns / 1000000);
   mark(now_rect_, is_concealed, is_concealed ? "predicted +" + ahead_ms + " ms" : "now");
   if (choice_.shows_entropy) {
     Reddening red = kEntropyRed;
     red.max_red *= float(frame().sample_freshness);
-    draw_red_cells(frame().sampled.bits, red, next_rect_);
+    draw_red_cells(frame().sampled.bits, kEntropyCells, red, next_rect_);
   }
   mark(next_rect_, true, maquette::text_of_next(frame(), choice_.shows_entropy));
   if (!choice_.shows_sample || frame().sampled.image.empty()) return;
@@ -142,7 +142,7 @@ void PredictionView::add_to_report(nlohmann::ordered_json* report) const {
                         {"conceals_gaps", frame().conceals_gaps},
                         {"concealed_frames", frame().gaps.predicted_count},
                         {"latest_gap_ms", frame().gaps.latest_gap_ms}};
-  json["novelty"] = novelty_report(frame());
+  json["health"] = health_report(frame());
   const maquette::SampledFuture& sampled = frame().sampled;
   json["sample_px"] = window_.in_pixels(sample_rect_).numbers();
   json["sample"] = {{"number", sampled.number},
@@ -164,7 +164,7 @@ Action PredictionView::draw_panel() {
     choice_.ahead_s = double(ahead_ms) / 1e3;
     changed = true;
   }
-  ImGui::TextUnformatted("Method (1 to 4)");
+  ImGui::TextUnformatted("Method (1 to 3)");
   for (size_t i = 0; i < kMethodNames.size(); ++i) {
     if (i != 0) ImGui::SameLine(float(i) * 75 * window_.scale());
     const auto method = maq_predictor_method(i);
@@ -176,10 +176,10 @@ Action PredictionView::draw_panel() {
   ImGui::Separator();
   changed |= ImGui::Checkbox("Conceal gaps (B)", &choice_.conceals_gaps);
   draw_gaps();
-  changed |= ImGui::Checkbox("Novelty (S)", &choice_.scores_novelty);
+  changed |= ImGui::Checkbox("Camera health (S)", &choice_.checks_camera);
   changed |= draw_entropy_text();
   if (changed) live_.set_choice(choice_);
-  if (choice_.scores_novelty) draw_novelty_text(frame(), window_.scale());
+  if (choice_.checks_camera) draw_health_text(frame(), window_.scale());
   ImGui::Separator();
   ImGui::TextWrapped("Images with a magenta border are predicted: never steer anything by them.");
   if (ImGui::Button("People (F7)")) action = Action::kPrediction;

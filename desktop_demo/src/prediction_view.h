@@ -1,5 +1,6 @@
-// Shows a source and its predicted frame. On request: short gaps concealed, novelty over and below the source, entropy
-// over the predicted frame, and a sampled future beside them. Predicted images have a magenta border and a text.
+// Shows a source and its predicted frame. On request: short gaps concealed, camera health over and below the source,
+// entropy over the predicted frame, and a sampled future beside them. Predicted images have a magenta border and a
+// text.
 #pragma once
 
 #include <app/prediction/live_prediction.h>

@@ -12,13 +12,12 @@ int main(int argc, char** argv) try {
   const double ahead_s = argc > 3 ? std::atof(argv[3]) : 0.1;
   const maquette::Context context;
   maquette::Pipeline pipeline(context);
-  const maquette::Novelty novelty(context);
-  pipeline.set_model(maquette::PredictionModel(context, maquette::Predictor(context), ahead_s, &novelty));
+  pipeline.set_model(maquette::PredictionModel(context, maquette::Predictor(context), ahead_s, true));
   pipeline.set_source(argv[1]);
   unsigned long long events = 0;
   while (const auto result = pipeline.next()) {
     maquette::predicted_frame_of(*result)->save(argv[2]);  // with a mark in the file
-    events += maquette::novelty_of(*result)->is_event == 1 ? 1 : 0;
+    events += maquette::camera_health_of(*result)->event != MAQ_CAMERA_OK ? 1 : 0;
   }
   std::printf("%.0f ms ahead, %llu events\n", 1e3 * ahead_s, events);
   return 0;

@@ -11,8 +11,6 @@ from export.bundle import write_manifest as write_bundle_manifest
 from export.prediction.code_file import FrameCodes, read_code_file
 from export.prediction.graphs.transformer_file import TransformerTables, read_transformer_file
 from export.prediction.graphs.transformer_graphs import CONTEXT, SLICES, head_name
-from export.prediction.motion_images import HORIZONS
-from export.prediction.refiner.refiner_graph import REFINED
 
 GRAPHS = ("encoder", "decoder")
 CODES, TRANSFORMER = "codes.maqc", "transformer.maqr"
@@ -41,8 +39,8 @@ def frame_side(graphs: dict[str, Signature], slices: int, width: int, side: int)
 
 
 def write_manifest(folder: Path, info: BundleInfo) -> dict:
-    """Writes `manifest.json` for the graphs, `codes.maqc` and the optional `transformer.maqr` and `mended.onnx` in
-    `folder`, and returns it. Raises ValueError where these files do not belong together."""
+    """Writes `manifest.json` for the graphs, `codes.maqc` and the optional `transformer.maqr` in `folder`, and
+    returns it. Raises ValueError where these files do not belong together."""
     codes = read_code_file(folder / CODES)
     graphs = {name: signature_of(folder / f"{name}.onnx") for name in GRAPHS}
     slices, _, width = codes.entries.shape
@@ -54,10 +52,6 @@ def write_manifest(folder: Path, info: BundleInfo) -> dict:
         require_transformer(graphs, tables, codes)
         keys["transformer"] = {"file": TRANSFORMER, "fps": list(TRAINED_FPS)}
         files.append(TRANSFORMER)
-    if (folder / f"{REFINED}.onnx").exists():
-        graphs[REFINED] = signature_of(folder / f"{REFINED}.onnx")
-        before = graphs[REFINED]["inputs"]["pictures"][3] // 3 - 1
-        keys[REFINED] = {"before": before, "max_ahead": max(HORIZONS), "fps": list(TRAINED_FPS)}
     return write_bundle_manifest(folder, "prediction", info, graphs, files=files, task_keys=keys)
 
 

@@ -29,9 +29,6 @@ from export.prediction.codes import read_codes
 from export.prediction.config import CODE_SIDE
 from export.prediction.export_transformer import export_transformer
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.refiner.convolutional import ConvolutionalNet
-from export.prediction.refiner.refiner_graph import REFINED, export_refined
-from export.prediction.refiner.train_convolutional import load_convolutional
 from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
 from export.prediction.train_transformer import load_transformer
@@ -95,16 +92,12 @@ def export_bundle(
     folder: Path,
     info: BundleInfo,
     transformer: LatentTransformer | None = None,
-    refiner: ConvolutionalNet | None = None,
 ) -> dict[str, float]:
     """The whole bundle; returns how far each part is from torch. Raises ValueError where that is too far. table: the
     transformer's own, where there is one."""
     folder.mkdir(parents=True, exist_ok=True)
     differences = export_graphs(net, folder)
-    for name in (TRANSFORMER, f"{REFINED}.onnx"):  # of an earlier export
-        (folder / name).unlink(missing_ok=True)
-    if refiner is not None:
-        differences[REFINED] = export_refined(refiner, folder)
+    (folder / TRANSFORMER).unlink(missing_ok=True)  # of an earlier export
     if transformer is not None:
         differences["transformer"] = export_transformer(transformer, folder)
         write_whole(transformer_bytes(TransformerTables.of(transformer)), folder / TRANSFORMER)
@@ -121,7 +114,6 @@ def main() -> None:
         "--codes", type=Path, default=Path(".data/prediction"), help="folder of export.prediction.codes"
     )
     parser.add_argument("--transformer", type=Path, help="its weights, whose table is taken; default: without one")
-    parser.add_argument("--refiner", type=Path, help="weights of the refiner; default: without one")
     parser.add_argument("--out", type=Path, default=Path(".data/bundles/prediction-fp32"))
     parser.add_argument("--name", help="default: the folder's name")
     options = parser.parse_args()
@@ -134,8 +126,7 @@ def main() -> None:
     else:
         table = CodeTable.of_stacked(transformer.table)
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=TRAINING_DATA)
-    refiner = load_convolutional(options.refiner) if options.refiner else None
-    for name, difference in export_bundle(net, table, options.out, info, transformer, refiner).items():
+    for name, difference in export_bundle(net, table, options.out, info, transformer).items():
         print(f"{name}: within {difference:.1e} of torch")
     print(f"{options.out}: {bytes_of(options.out) / 1e6:.2f} MB")
 

@@ -22,7 +22,7 @@ from export.prediction.autoencoder import Autoencoder, scaled
 from export.prediction.codebook import used_fraction
 from export.prediction.config import AUTOENCODERS, AutoencoderShape
 from export.prediction.data import Clips, drawn_frames, read_clips, read_stills, varied
-from export.prediction.refiner.image_error import psnr_db, rebuilt
+from export.prediction.image_error import psnr_db, rebuilt
 
 _STILLS = 0.25  # of a step's frames are photographs
 _CROPS = 40  # of each photograph

@@ -45,7 +45,7 @@ from maquette.pipeline import (
     PipelineResult,
     PredictionModel,
 )
-from maquette.prediction import Concealer, Novelty, NoveltyScore, Predictor
+from maquette.prediction import CameraHealth, CameraHealthResult, Concealer, Predictor
 from maquette.progress import ProgressLine
 from maquette.scene_making.make import make_scene
 from maquette.scene_making.report import SceneReport
@@ -65,14 +65,14 @@ from maquette.textures import DensePoseTexture
 
 __all__ = [
     "BODY_ANGLES", "COCO_KEYPOINTS", "KEYPOINTS", "Body", "BodyClip", "BodyMesh", "BodyPerson", "BodyResult",
-    "BodySize", "BodySizes", "Box", "Camera", "CameraMode", "Capture", "ClipWriter", "Concealer", "Control", "Curve",
-    "Curves", "DenseCloud", "DensePose", "DensePoseModel", "DensePoseResult", "DensePoseTexture", "Edges",
-    "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head", "HeadBuilder", "HeadInfo", "HeadLandmark",
-    "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics", "MaquetteError", "Model", "MorphTarget",
-    "Novelty", "NoveltyScore", "Origin", "Person", "PinholeCamera", "Pipeline", "PipelineInfo", "PipelineResult",
-    "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder", "Scene", "SceneBuilder",
-    "SceneRenderer", "SceneReport", "Source", "SourceScheme", "View", "build_info", "library_path", "list_cameras",
-    "list_source_schemes", "make_scene", "part_colours", "part_name", "sample",
+    "BodySize", "BodySizes", "Box", "Camera", "CameraHealth", "CameraHealthResult", "CameraMode", "Capture",
+    "ClipWriter", "Concealer", "Control", "Curve", "Curves", "DenseCloud", "DensePose", "DensePoseModel",
+    "DensePoseResult", "DensePoseTexture", "Edges", "EdgesFusion", "EdgesModel", "EdgesResult", "Frame", "Head",
+    "HeadBuilder", "HeadInfo", "HeadLandmark", "HeadMesh", "HeadPhoto", "HeadRenderer", "Image", "Intrinsics",
+    "MaquetteError", "Model", "MorphTarget", "Origin", "Person", "PinholeCamera", "Pipeline", "PipelineInfo",
+    "PipelineResult", "PixelFormat", "PredictionModel", "Predictor", "ProgressLine", "Recorder", "Scene",
+    "SceneBuilder", "SceneRenderer", "SceneReport", "Source", "SourceScheme", "View", "build_info", "library_path",
+    "list_cameras", "list_source_schemes", "make_scene", "part_colours", "part_name", "sample",
 ]  # fmt: skip
 
 __version__: str

@@ -15,7 +15,7 @@ from maquette.densepose import DensePoseResult, Person, densepose_config, densep
 from maquette.edges import Curves, EdgesResult, curves_config, edges_config, edges_result
 from maquette.frames import Frame
 from maquette.native import LentResult, NativeObject, as_python, native, path_to_write
-from maquette.prediction import Novelty, NoveltyScore, Predictor, novelty_score
+from maquette.prediction import CameraHealthResult, Predictor, camera_health_result
 from maquette.sources import uri_of
 
 if TYPE_CHECKING:
@@ -72,13 +72,12 @@ class EdgesModel(Model):
 
 
 class PredictionModel(Model):
-    """Predicts the frame `ahead_s` seconds after each frame, and scores its novelty unless `novelty` is None. It has
-    the settings of both, and shares their networks."""
+    """Predicts the frame `ahead_s` seconds after each frame, and checks the camera on request. It has the settings of
+    the predictor, and shares its networks."""
 
-    def __init__(self, predictor: Predictor, ahead_s: float, novelty: Novelty | None = None) -> None:
+    def __init__(self, predictor: Predictor, ahead_s: float, checks_camera: bool = False) -> None:
         n = native()
-        scored = n.ffi.NULL if novelty is None else novelty.handle
-        create = ("maq_model", n.context, predictor.handle, float(ahead_s), scored)
+        create = ("maq_model", n.context, predictor.handle, float(ahead_s), int(checks_camera))
         super().__init__(n.create(*create, function="maq_prediction_model_create"))
 
 
@@ -126,16 +125,16 @@ class PipelineResult(NativeObject):
         return None if part is None else Frame.of_handle(part)
 
     @functools.cached_property
-    def novelty(self) -> NoveltyScore | None:
-        """The score of the frame, of a `PredictionModel` with novelty; its map is empty."""
+    def camera_health(self) -> CameraHealthResult | None:
+        """The health of the camera, of a `PredictionModel` that checks it; without a map."""
         n = native()
-        score = n.sized("maq_novelty_score")
-        status = n.ask("maq_pipeline_result_get_novelty", self.handle, score)
+        health = n.sized("maq_camera_health_result")
+        status = n.ask("maq_pipeline_result_get_camera_health", self.handle, health)
         if status == n.lib.MAQ_ERROR_NOT_FOUND:
             return None
         if status:
-            n.fail("maq_pipeline_result_get_novelty", status)
-        return novelty_score(score, np.empty((0, 0), np.float32))
+            n.fail("maq_pipeline_result_get_camera_health", status)
+        return camera_health_result(health, None)
 
     @property
     def stats(self) -> dict[str, Any]:
@@ -261,7 +260,7 @@ def _not_a_model(given: Any) -> str:
     """A sentence with the model that the caller wants: DensePoseModel for a DensePose, or for a class."""
     arguments = {"DensePoseModel": "", "EdgesModel": "", "PredictionModel": "predictor, ahead_s=0.1"}
     name = given.__name__ if isinstance(given, type) else type(given).__name__
-    model = {"Predictor": "PredictionModel", "Novelty": "PredictionModel"}.get(
+    model = {"Predictor": "PredictionModel", "CameraHealth": "PredictionModel"}.get(
         name, name.replace("Model", "") + "Model"
     )
     wanted = (

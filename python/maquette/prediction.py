@@ -1,4 +1,4 @@
-"""Prediction: the next frames of a stream, its novelty, and live sources with short gaps filled."""
+"""Prediction: the next frames of a stream, the health of its camera, and live sources with short gaps filled."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from maquette.sources import Source
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from maquette.settings import ConcealerSettings, NoveltyMethod, NoveltySettings, PredictorMethod, PredictorSettings
+    from maquette.settings import ConcealerSettings, PredictorMethod, PredictorSettings
 
 
 class Predictor(NativeObject):
     """Takes the frames of a stream and predicts later ones.
 
-    method: "last" repeats the last frame. "motion" moves everything on at its speed. "auto" blends both per cell,
-    weighted by their past errors. "refined" is "auto", refined by a network. "sampled" samples possible futures by a
-    transformer. shared_with: a predictor of the same method, refined or sampled, whose networks this one shares.
-    settings: fields of maq_predictor_config by their names. Predicted frames are guesses: never steer anything by
-    them.
+    method: "auto" blends the last frame and its motion per cell, weighted by their past errors; it hides 30 to 100 ms
+    of latency. "last" repeats the last frame. "motion" moves everything on at its speed. "sampled" samples possible
+    futures by a transformer (for research). shared_with: another predictor that samples, whose networks this one
+    shares. settings: fields of maq_predictor_config by their names. Predicted frames are guesses: never steer anything
+    by them.
     """
 
     def __init__(
@@ -97,75 +97,65 @@ class Predictor(NativeObject):
 
 
 @dataclass(frozen=True, eq=False)
-class NoveltyScore:
-    """The score of one frame.
+class CameraHealthResult:
+    """The result for one frame.
 
-    bits: mean of all codes: about 0.03 when nothing changes, 1 to 3 when much moves. ratio: to the median of the 8
-    frames before; 1 while they are unknown. is_event: a cut, or the ratio reached event_ratio or 1 / event_ratio.
-    is_cut: the previous frame does not make this one more likely. is_stream_start: the frame continues no stream: the
-    first one, another size or format, a pause. map: float32 [16, 16], bits of a code per cell.
+    event: "ok", "cut", "freeze", "black", "covered", "moved" or "object". state: what lasts: "freeze", "black" or
+    "covered", or "ok". began_s: time of the event's first frame. x_px, y_px: the middle of an object, or how far a
+    moved picture moved. unexplained: fraction of the frame that no motion from the frame before explains.
+    is_stream_start: the frame continues no stream: the first one, another size or format, a pause. map: float32 [rows,
+    columns], how far motion leaves each cell unexplained, 0 to 1; None in results of a pipeline.
     """
 
-    bits: float
-    ratio: float
-    is_event: bool
-    is_cut: bool
+    event: str
+    state: str
+    began_s: float
+    x_px: float
+    y_px: float
+    unexplained: float
     is_stream_start: bool
-    map: np.ndarray
+    map: np.ndarray | None
 
     def __repr__(self) -> str:
-        marks = "".join(f", {m}" for m in ("event", "cut", "stream_start") if getattr(self, f"is_{m}"))
-        return f"<NoveltyScore {self.bits:.3f} bits, ratio {self.ratio:.2f}{marks}>"
+        return f"<CameraHealthResult {self.event}, state {self.state}, {self.unexplained:.0%} unexplained>"
 
 
-def novelty_score(score: Any, cells: np.ndarray) -> NoveltyScore:
-    """Copies a maq_novelty_score."""
-    flags = bool(score.is_event), bool(score.is_cut), bool(score.is_stream_start)
-    return NoveltyScore(score.bits, score.ratio, *flags, cells)
+def camera_health_result(result: Any, cells: np.ndarray | None) -> CameraHealthResult:
+    """Copies a maq_camera_health_result."""
+    n = native()
+    event, state = (n.text(n.lib.maq_camera_event_get_name(value)) for value in (result.event, result.state))
+    return CameraHealthResult(
+        event, state, result.began_ns / 1e9, result.x_px, result.y_px, result.unexplained,
+        bool(result.is_stream_start), cells,
+    )  # fmt: skip
 
 
-class Novelty(NativeObject):
-    """Scores how unexpected each frame of a stream is after the frames before, and where, in bits.
+class CameraHealth(NativeObject):
+    """Tells whether the camera of a stream is all right: cuts, freezes, black or covered pictures, knocks, objects
+    that are there at once. Needs no networks. Raises MaquetteError."""
 
-    shared_with: another stream whose networks this one shares. method: the source of probabilities: "auto" (the
-    bundle's transformer, if it has one) or "bigram", which takes about 0 ms. settings: fields of maq_novelty_config by
-    their names, such as event_ratio=6. Raises MaquetteError.
-    """
-
-    def __init__(
-        self, shared_with: Novelty | None = None, method: NoveltyMethod = "auto", **settings: Unpack[NoveltySettings]
-    ) -> None:
+    def __init__(self) -> None:
         n = native()
-        shared = {} if shared_with is None else {"shared_with": shared_with.handle}
-        config = n.config("maq_novelty_config", {"method": method, **shared, **settings})
-        super().__init__(n.create("maq_novelty", n.context, config))
+        super().__init__(n.create("maq_camera_health", n.context))
 
-    def push(self, image: Frame | ArrayImage, time_s: float | None = None) -> NoveltyScore:
-        """Scores the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
+    def push(self, image: Frame | ArrayImage, time_s: float | None = None) -> CameraHealthResult:
+        """Checks the stream's next frame: a frame of a Source, or uint8 [H, W, 3] (RGB) or [H, W] with its time in
         seconds. Raises MaquetteError."""
         n = native()
-        score = n.sized("maq_novelty_score")
-        n.call("maq_novelty_push", self.handle, _timed_frame(image, time_s).handle, score)
-        cells = np.empty((score.rows, score.columns), np.float32)
-        n.call("maq_novelty_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
-        return novelty_score(score, cells)
+        result = n.sized("maq_camera_health_result")
+        n.call("maq_camera_health_push", self.handle, _timed_frame(image, time_s).handle, result)
+        cells = np.empty((result.rows, result.columns), np.float32)
+        n.call("maq_camera_health_copy_map", self.handle, n.ffi.from_buffer("float[]", cells), cells.size)
+        return camera_health_result(result, cells)
 
     def reset(self) -> None:
         """Forgets the frames so far, to begin another stream."""
-        native().call("maq_novelty_reset", self.handle)
-
-    def reconstruction(self) -> Frame:
-        """Decodes the codes of the latest frame: an image of 64 x 64 pixels with the detail that the network kept.
-        Hold at most four at once. Raises MaquetteError."""
-        frame = native().create(
-            "maq_frame", self.handle, function="maq_novelty_acquire_reconstruction", release="maq_frame_release"
-        )
-        return Frame.of_handle(frame)
+        native().call("maq_camera_health_reset", self.handle)
 
     @property
     def stats(self) -> dict[str, Any]:
-        """Milliseconds of the latest frame, and counts: the fields of maq_novelty_stats."""
-        return native().stats("maq_novelty_stats", "maq_novelty_get_stats", self.handle)
+        """Milliseconds of the latest frame, and counts: the fields of maq_camera_health_stats."""
+        return native().stats("maq_camera_health_stats", "maq_camera_health_get_stats", self.handle)
 
 
 class Concealer(NativeObject):

@@ -8,8 +8,7 @@ from typing import Literal, TypedDict
 
 PartColours = Literal["default", "detectron2", "magicanimate"]
 HeadShading = Literal["colour", "shape", "normals", "template", "depth"]
-NoveltyMethod = Literal["auto", "bigram"]
-PredictorMethod = Literal["auto", "last", "motion", "refined", "sampled"]
+PredictorMethod = Literal["auto", "last", "motion", "sampled"]
 SourceControl = Literal[
     "auto_exposure", "exposure", "gain", "auto_focus", "focus", "auto_white_balance", "white_balance", "brightness"
 ]
@@ -183,13 +182,6 @@ class PredictorSettings(ModelSettings, total=False):
 
     seed: int
     """SAMPLED: equal seeds give equal frames on one processor; default 0."""
-
-
-class NoveltySettings(ModelSettings, total=False):
-    """Fields of maq_novelty_config."""
-
-    event_ratio: float
-    """A frame is an event from this ratio up, and from 1 / event_ratio down: above 1, at most 1e6; 0 (default): 4."""
 
 
 class ConcealerSettings(TypedDict, total=False):

@@ -28,7 +28,7 @@ int main(int argc, char** argv) try {
   add_play_command(app, &exit_code);
 #if MAQ_HAS_PREDICTION
   add_predict_command(app, &exit_code);
-  add_novelty_command(app, &exit_code);
+  add_health_command(app, &exit_code);
 #endif
   add_record_command(app, &exit_code);
 #if MAQ_HAS_DENSEPOSE

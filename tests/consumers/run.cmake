@@ -51,9 +51,9 @@ if(WAY STREQUAL "find_package")
   if(NOT output MATCHES "the nose ends [0-9]+ mm before" OR NOT head STREQUAL "676c5446")  # "glTF"
     message(FATAL_ERROR "head printed ${output} and wrote ${head}")
   endif()
-  run(build/novelty "stub:people?frames=12&size=320x240")
+  run(build/camera_health "stub:people?frames=12&size=320x240")
   if(NOT output MATCHES "^12 frames\n$")
-    message(FATAL_ERROR "novelty printed ${output}")
+    message(FATAL_ERROR "camera_health printed ${output}")
   endif()
   run(build/predict "stub:people?frames=12&size=320x240" later.png 0.2)
   file(READ "${WORK_DIR}/later.png" head LIMIT 26 HEX)
@@ -73,7 +73,7 @@ if(WAY STREQUAL "find_package")
   foreach(name missing text)
     foreach(words "count_people;image:${name}.jpg" "draw_people;image:${name}.jpg;o.png" "predict;image:${name}.jpg;o.png"
         "box_size;image:${name}.jpg?depth_unit=0.001&fov=60" "head;image:${name}.jpg;o.glb" "live;image:${name}.jpg"
-        "novelty;image:${name}.jpg" "new_view;${scene}/bundle;${name}.jpg;o.png")
+        "camera_health;image:${name}.jpg" "new_view;${scene}/bundle;${name}.jpg;o.png")
       list(POP_FRONT words program)
       execute_process(COMMAND "build/${program}" ${words} WORKING_DIRECTORY "${WORK_DIR}" RESULT_VARIABLE result
         ERROR_VARIABLE error OUTPUT_QUIET)

@@ -24,10 +24,10 @@ PEOPLE_RUN = (
 )  # fmt: skip
 SCENE_RUN = ("scene", "build", str(CAPTURE), "--bundle", "bundle", "--out", "a.maqs", "--threads", "1")
 HEAD_RUN = (*(word if word != str(HEADS_BUNDLE) else "bundle" for word in HEAD), "--out", "a.glb")
-NOVELTY_RUN = ("novelty", "stub:people?size=64x48&frames=3", "--json", "--bundle", "bundle",
-                "--threads", "1", "--out", "a.avi")  # fmt: skip
+SAMPLES_RUN = ("predict", "stub:people?size=64x48&frames=6", "--from", "3", "--frames", "1", "--samples", "1",
+               "--bundle", "bundle", "--threads", "1", "--out", "a.mp4")  # fmt: skip
 KINDS = ((PEOPLE_BUNDLE, PEOPLE_RUN), (SCENE_BUNDLE, SCENE_RUN), (HEADS_BUNDLE, HEAD_RUN),
-         (PREDICTION_BUNDLE, NOVELTY_RUN))  # fmt: skip
+         (PREDICTION_BUNDLE, SAMPLES_RUN))  # fmt: skip
 
 
 def _copied(source: Path, changes: dict[str, bytes], is_signed: bool):

@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build/soak"
-DRAWN = ("dense pose", "edges", "prediction", "novelty")  # the tasks of each round
+DRAWN = ("dense pose", "edges", "prediction", "camera health")  # the tasks of each round
 
 
 def run(program: Path, seconds: float) -> list[dict]:

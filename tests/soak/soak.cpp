@@ -99,7 +99,7 @@ void soak(double seconds, const std::string& folder) {
   maquette::DensePose densepose(context);
   maquette::Edges edges(context);
   maquette::Predictor predictor(context);
-  maquette::Novelty novelty(context);
+  maquette::CameraHealth health(context);
   Frames people(context, "stub:people?count=2&size=320x240"), solids(context, "stub:solids?scene=box&noise=tof");
   Frames moving(context, "stub:people?count=1&size=320x240&fps=30");
   std::vector<Task> tasks = {
@@ -114,7 +114,7 @@ void soak(double seconds, const std::string& folder) {
          predictor.push(moving.next());
          (void)predictor.predict(0.1);
        }},
-      {"novelty", 1, [&] { (void)novelty.push(people.next()); }},
+      {"camera health", 1, [&] { (void)health.push(people.next()); }},
       {"record and replay", 10, [&] { record_and_replay(context, folder + "/soak.maqrec"); }},
       {"save", 10, [&] { densepose.run(people.next()).save(folder + "/soak"); }},
       {"errors", 10, [&] { make_errors(context); }},

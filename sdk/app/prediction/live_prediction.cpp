@@ -27,8 +27,7 @@ std::string whole(double value) { return std::to_string(std::lround(value)); }
 std::string text_of_method(const maq_predictor_stats& stats) {
   if (stats.method == MAQ_PREDICTOR_LAST) return "last";
   if (stats.method == MAQ_PREDICTOR_MOTION) return "motion";
-  const std::string refined = stats.method == MAQ_PREDICTOR_REFINED ? ", refined" : "";
-  return whole(100 * double(stats.motion_fraction)) + " % motion" + refined;
+  return whole(100 * double(stats.motion_fraction)) + " % motion";
 }
 
 std::string text_of_next(const PredictionFrame& frame, bool has_entropy) {
@@ -142,10 +141,9 @@ void LivePrediction::run() {
 
 void LivePrediction::close_source() {
   recorder_.reset(), recording_.clear();
-  concealer_.reset(), predictor_.reset(), novelty_.reset(), source_.reset(), samples_.reset();
+  concealer_.reset(), predictor_.reset(), health_.reset(), source_.reset(), samples_.reset();
   frame_.sampled = {};
-  is_novelty_switched_ = false;
-  frame_.novelty.clear(), frame_.novelty_bits.clear();
+  frame_.health.clear(), frame_.health_map.clear();
   has_pushed_ = false;
   times_.clear();
 }
@@ -209,23 +207,14 @@ void LivePrediction::apply(const Wanted& wanted) {
   const bool conceals = choice.conceals_gaps && source_->info().is_live == 1;
   if (conceals && !concealer_) concealer_.emplace(context_, *source_);
   if (!conceals) concealer_.reset();
-  if (is_novelty_switched_ != choice.scores_novelty) switch_novelty(choice);
+  if (health_.has_value() != choice.checks_camera) switch_health(choice.checks_camera);
   switch_samples(choice);
 }
 
-// Falls back to MAQ_PREDICTOR_AUTO if the bundle lacks the network.
 void LivePrediction::switch_method(const PredictionChoice& choice) {
   maq_predictor_config config = default_predictor_config();
   config.method = method_ = choice.method;
-  if (!choice.bundle.empty()) config.model.bundle_path = choice.bundle.c_str();
-  try {
-    predictor_.emplace(context_, config);
-  } catch (const Error& error) {
-    if (config.method != MAQ_PREDICTOR_REFINED) throw;
-    config.method = MAQ_PREDICTOR_AUTO;
-    predictor_.emplace(context_, config);
-    enter(MAQ_PIPELINE_RUNNING, error.what());
-  }
+  predictor_.emplace(context_, config);
   has_pushed_ = false;
 }
 
@@ -264,19 +253,10 @@ bool LivePrediction::take_sample() {
   return is_newer;
 }
 
-// Without its network, the image goes on.
-void LivePrediction::switch_novelty(const PredictionChoice& choice) {
-  is_novelty_switched_ = choice.scores_novelty;
-  novelty_.reset();
-  frame_.novelty.clear(), frame_.novelty_bits.clear();
-  if (!choice.scores_novelty) return;
-  maq_novelty_config config = default_novelty_config();
-  if (!choice.bundle.empty()) config.model.bundle_path = choice.bundle.c_str();
-  try {
-    novelty_.emplace(context_, config);
-  } catch (const Error& error) {
-    enter(MAQ_PIPELINE_RUNNING, error.what());
-  }
+void LivePrediction::switch_health(bool is_on) {
+  health_.reset();
+  frame_.health.clear(), frame_.health_map.clear();
+  if (is_on) health_.emplace(context_);
 }
 
 // When the disk is full, the image goes on.
@@ -289,13 +269,13 @@ void LivePrediction::record(const std::function<void()>& step) {
   }
 }
 
-void LivePrediction::score_novelty(const Frame& frame) {
+void LivePrediction::check_camera(const Frame& frame) {
   const int64_t timestamp_ns = frame.desc().timestamp_ns;
-  if (frame_.novelty.empty()) first_ns_ = timestamp_ns;
-  frame_.novelty.push_back({novelty_->push(frame), double(timestamp_ns - first_ns_) / 1e9});
-  if (frame_.novelty.size() > kMaxMomentsKept) frame_.novelty.pop_front();
-  frame_.novelty_bits = novelty_->map();
-  frame_.novelty_ms = double(novelty_->stats().push_ms);
+  if (frame_.health.empty()) first_ns_ = timestamp_ns;
+  frame_.health.push_back({health_->push(frame), double(timestamp_ns - first_ns_) / 1e9});
+  if (frame_.health.size() > kMaxMomentsKept) frame_.health.pop_front();
+  frame_.health_map = health_->map();
+  frame_.health_ms = double(health_->stats().push_ms);
 }
 
 void LivePrediction::play_frame(const Wanted& wanted) {
@@ -322,7 +302,7 @@ void LivePrediction::show(Frame frame, const Wanted& wanted) {
       if (recorder_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) recorder_->add(frame);
     });
     predictor_->push(frame);
-    if (novelty_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) score_novelty(frame);
+    if (health_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) check_camera(frame);
     if (samples_ && frame_.origin.kind != MAQ_FRAME_PREDICTED) {
       samples_->push(frame);
       if (!options_.real_time) samples_->wait();

@@ -1,6 +1,6 @@
-// Plays a source with its predicted frames (maquette/prediction.h) and their novelty (maquette/novelty.h) on a thread
-// of its own, for programs with a window. Fills short gaps on request (maquette/concealer.h), which a pipeline does
-// not. live_samples.h estimates the uncertainty in parallel.
+// Plays a source with its predicted frames (maquette/prediction.h) and a check of its camera (maquette/camera_health.h)
+// on a thread of its own, for programs with a window. Fills short gaps on request (maquette/concealer.h), which a
+// pipeline does not. live_samples.h estimates the uncertainty in parallel.
 //
 //   maquette::LivePrediction live(context, {}, [&](const maquette::PredictionFrame& frame) { … });
 //   live.open("stub:people?stall=300ms@3s");
@@ -28,13 +28,13 @@ struct PredictionChoice {
   double ahead_s = 0.2;
   maq_predictor_method method = MAQ_PREDICTOR_AUTO;
   bool conceals_gaps = false;  // of a source that plays in real time; others have no gaps
-  bool scores_novelty = false;
+  bool checks_camera = false;
   bool shows_entropy = false, shows_sample = false;  // of the predicted frame; a sampled frame beside it
   std::string bundle;                                // folder of the networks; "": the one installed with the library
 };
 
-struct NoveltyMoment {
-  maq_novelty_score score{};
+struct HealthMoment {
+  maq_camera_health_result result{};
   double time_s = 0;  // timestamp of its frame, relative to the first frame
 };
 
@@ -46,12 +46,12 @@ struct PredictionFrame {
   maq_predictor_stats stats{};   // of `next`
   maq_concealer_stats gaps{};    // since concealment was switched on
   bool conceals_gaps = false;
-  std::deque<NoveltyMoment> novelty;  // of the latest captured frames, at most 300; empty unless wanted
-  std::vector<float> novelty_bits;    // map of the last one, score.rows rows of score.columns cells
-  double novelty_ms = 0;              // that it took
-  SampledFuture sampled;              // the latest, mostly after an earlier frame; number 0: none
-  double sample_age_ms = 0;           // of that frame when `now` was shown
-  double sample_freshness = 0;        // 1 up to 0.5 s of age, falling to 0 at 2 s
+  std::deque<HealthMoment> health;  // of the latest captured frames, at most 300; empty unless wanted
+  std::vector<float> health_map;    // of the last one, result.rows rows of result.columns cells
+  double health_ms = 0;             // that it took
+  SampledFuture sampled;            // the latest, mostly after an earlier frame; number 0: none
+  double sample_age_ms = 0;         // of that frame when `now` was shown
+  double sample_freshness = 0;      // 1 up to 0.5 s of age, falling to 0 at 2 s
   double waiting_ms = 0, results_per_second = 0;
   uint64_t number = 0;  // 0: none yet
 };
@@ -94,8 +94,8 @@ class LivePrediction final : public LivePlayer {
   void apply(const Wanted& wanted);
   void record(const std::function<void()>& step);
   void switch_method(const PredictionChoice& choice);
-  void switch_novelty(const PredictionChoice& choice);
-  void score_novelty(const Frame& frame);
+  void switch_health(bool is_on);
+  void check_camera(const Frame& frame);
   void switch_samples(const PredictionChoice& choice);
   bool take_sample();
   void play_frame(const Wanted& wanted);
@@ -125,11 +125,10 @@ class LivePrediction final : public LivePlayer {
   std::optional<Predictor> predictor_;
   maq_predictor_method method_ = MAQ_PREDICTOR_AUTO;
   std::string recording_;
-  std::optional<Novelty> novelty_;
-  bool is_novelty_switched_ = false;  // on; without novelty_ it failed
+  std::optional<CameraHealth> health_;
   std::optional<LiveSamples> samples_;
   bool has_sample_problem_ = false;  // it was reported
-  int64_t first_ns_ = 0;             // timestamp of the first scored frame
+  int64_t first_ns_ = 0;             // timestamp of the first checked frame
   PredictionFrame frame_;
   int64_t pushed_ns_ = 0, shown_ns_ = 0;  // timestamps of the latest captured frame, and of `now`
   bool has_pushed_ = false;

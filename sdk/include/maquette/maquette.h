@@ -124,8 +124,8 @@
 #include "maquette/head.h"
 #endif
 #if MAQ_HAS_PREDICTION
+#include "maquette/camera_health.h"
 #include "maquette/concealer.h"
-#include "maquette/novelty.h"
 #include "maquette/prediction.h"
 #include "maquette/prediction_model.h"
 #endif

@@ -22,31 +22,29 @@ typedef struct maq_predictor maq_predictor;
 
 /* How frames are predicted. Values never change meaning; new ones are added at the end. */
 typedef enum maq_predictor_method {
-  MAQ_PREDICTOR_AUTO = 0,    /* blends LAST and MOTION in each block of pixels, weighted by their errors on past frames
-                                at the same time ahead. Equals LAST while errors are unknown or nothing moves. */
-  MAQ_PREDICTOR_LAST = 1,    /* repeats the last frame */
-  MAQ_PREDICTOR_MOTION = 2,  /* each pixel continues its motion between the last two frames */
-  MAQ_PREDICTOR_REFINED = 3, /* refines AUTO by a network that sees the past frames at 64 x 64 pixels. Best for more
-                                than 0.1 s ahead. Not for concealers. */
-  MAQ_PREDICTOR_SAMPLED = 4  /* a transformer samples one possible future, in steps of at most 0.1 s, and changes AUTO
-                                by it. Slow; needed for maq_predictor_sample. Not for concealers. */
+  MAQ_PREDICTOR_AUTO = 0,   /* blends LAST and MOTION in each block of pixels, weighted by their errors on past frames
+                               at the same time ahead. Equals LAST while errors are unknown or nothing moves. */
+  MAQ_PREDICTOR_LAST = 1,   /* repeats the last frame */
+  MAQ_PREDICTOR_MOTION = 2, /* each pixel continues its motion between the last two frames */
+  MAQ_PREDICTOR_SAMPLED = 3 /* a transformer samples one possible future, in steps of at most 0.1 s, and changes AUTO
+                               by it. For research: errors are larger than those of AUTO. Slow; needed for
+                               maq_predictor_sample. Not for concealers. */
 } maq_predictor_method;
 
 /* Options. 0 is the default in every field; `model` has its own (types.h). */
 typedef struct maq_predictor_config {
   uint32_t struct_size;
   maq_model_options model;     /* `threads` applies to each method (MAQ_THREADS_MEASURED is not supported). Other fields
-                                  apply to REFINED and SAMPLED. Default bundle: share/maquette/models/prediction-int8,
-                                  installed with the library. */
+                                  apply to SAMPLED. Default bundle: share/maquette/models/prediction-int8, installed
+                                  with the library. */
   maq_predictor_method method; /* default MAQ_PREDICTOR_AUTO */
   uint32_t frame_pool_size;    /* predicted frames the app may hold at once, 1 to 64; 0 (default): 4 */
   float temperature; /* SAMPLED: 0 (default) takes the likeliest code; 1 samples by the probabilities; larger values
                         vary more */
   uint64_t seed;     /* SAMPLED: equal seeds give equal frames on one processor; default 0 */
-  const maq_predictor* shared_with; /* shares the networks of this predictor, which has the same method, REFINED or
-                                       SAMPLED. `model` then sets only the threads for pixels. The two predictors run
-                                       their networks one after the other. Either may be destroyed first. Default NULL:
-                                       own networks */
+  const maq_predictor* shared_with; /* shares the networks of this predictor, which samples, too. `model` then sets
+                                       only the threads for pixels. The two predictors run their networks one after the
+                                       other. Either may be destroyed first. Default NULL: own networks */
 } maq_predictor_config;
 
 /* Wall-clock milliseconds of the latest calls, and counts since the predictor was created. */
@@ -54,7 +52,7 @@ typedef struct maq_predictor_stats {
   uint32_t struct_size;
   float luma_ms;                /* latest push: the luma pyramid of the frame */
   float flow_ms;                /* latest push: optical flow from the frame before */
-  float weights_ms;             /* latest push: blend weights (AUTO, REFINED, SAMPLED) */
+  float weights_ms;             /* latest push: blend weights (AUTO, SAMPLED) */
   float push_ms;                /* latest push: total without networks */
   float project_ms;             /* latest prediction: the flow projected to the later time */
   float warp_ms;                /* latest prediction: pixels warped along the flow */
@@ -78,7 +76,7 @@ MAQ_API maq_status maq_predictor_config_init(maq_predictor_config* config, uint3
 
 /* Creates a predictor for one stream. `config` may be NULL for the defaults. Free `*predictor` with
  * maq_predictor_destroy. Predictors of one context share scratch memory; each adds one frame plus about 1 MB (at 640 x
- * 480 pixels). REFINED and SAMPLED load a bundle of the task "prediction" and check its files.
+ * 480 pixels). SAMPLED loads a bundle of the task "prediction" and checks its files.
  * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT; with networks also MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE,
  * MAQ_ERROR_UNSUPPORTED (another task, or no network for the method), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while files are
  * read. */

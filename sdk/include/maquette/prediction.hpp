@@ -1,4 +1,4 @@
-// Predicted frames, novelty, and live sources with short gaps filled, for C++17; a part of maquette.hpp.
+// Predicted frames, camera health, and live sources with short gaps filled, for C++17; a part of maquette.hpp.
 #ifndef MAQUETTE_PREDICTION_HPP_
 #define MAQUETTE_PREDICTION_HPP_
 
@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "maquette/camera_health.h"
 #include "maquette/concealer.h"
 #include "maquette/frame.hpp"
-#include "maquette/novelty.h"
 #include "maquette/prediction.h"
 #include "maquette/source.hpp"
 
@@ -72,55 +72,44 @@ class Predictor {
   Owner<maq_predictor, maq_predictor_destroy> owner_;
 };
 
-inline maq_novelty_config default_novelty_config() {
-  maq_novelty_config config;
-  check(maq_novelty_config_init(&config, sizeof config));
-  return config;
-}
+inline const char* name_of(maq_camera_event event) { return maq_camera_event_get_name(event); }
 
-// Scores the frames of one stream. Streams share networks by `shared_with` of their configs.
-class Novelty {
+// Checks the camera of one stream.
+class CameraHealth {
  public:
-  explicit Novelty(const Context& context, const maq_novelty_config& config = default_novelty_config()) {
-    maq_novelty* created = nullptr;
-    check(maq_novelty_create(context.get(), &config, &created));
+  explicit CameraHealth(const Context& context) {
+    maq_camera_health* created = nullptr;
+    check(maq_camera_health_create(context.get(), &created));
     owner_.reset(created);
   }
 
-  maq_novelty* get() const { return owner_.get(); }
+  maq_camera_health* get() const { return owner_.get(); }
 
-  maq_novelty_score push(const Frame& frame) {
-    score_.struct_size = sizeof score_;
-    check(maq_novelty_push(get(), frame.get(), &score_));
-    return score_;
+  maq_camera_health_result push(const Frame& frame) {
+    result_.struct_size = sizeof result_;
+    check(maq_camera_health_push(get(), frame.get(), &result_));
+    return result_;
   }
 
-  // Returns the map of the latest frame: score.rows rows of score.columns cells.
+  // Returns the map of the latest frame: result.rows rows of result.columns cells.
   std::vector<float> map() const {
-    std::vector<float> bits(size_t(score_.columns) * size_t(score_.rows));
-    check(maq_novelty_copy_map(get(), bits.data(), bits.size()));
-    return bits;
+    std::vector<float> values(size_t(result_.columns) * size_t(result_.rows));
+    check(maq_camera_health_copy_map(get(), values.data(), values.size()));
+    return values;
   }
 
-  // Decodes the codes of the latest frame.
-  Frame reconstruction() {
-    maq_frame* frame = nullptr;
-    check(maq_novelty_acquire_reconstruction(get(), &frame));
-    return Frame(frame);
-  }
+  void reset() { check(maq_camera_health_reset(get())); }
 
-  void reset() { check(maq_novelty_reset(get())); }
-
-  maq_novelty_stats stats() const {
-    maq_novelty_stats stats{};
+  maq_camera_health_stats stats() const {
+    maq_camera_health_stats stats{};
     stats.struct_size = sizeof stats;
-    check(maq_novelty_get_stats(get(), &stats));
+    check(maq_camera_health_get_stats(get(), &stats));
     return stats;
   }
 
  private:
-  Owner<maq_novelty, maq_novelty_destroy> owner_;
-  maq_novelty_score score_{};
+  Owner<maq_camera_health, maq_camera_health_destroy> owner_;
+  maq_camera_health_result result_{};
 };
 
 inline maq_concealer_config default_concealer_config() {

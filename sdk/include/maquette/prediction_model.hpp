@@ -12,12 +12,9 @@ namespace maquette {
 
 class PredictionModel : public Model {
  public:
-  // `novelty` null: novelty is not scored.
-  PredictionModel(const Context& context, const Predictor& predictor, double ahead_s,
-                  const Novelty* novelty = nullptr) {
+  PredictionModel(const Context& context, const Predictor& predictor, double ahead_s, bool checks_camera = false) {
     maq_model* made = nullptr;
-    check(maq_prediction_model_create(context.get(), predictor.get(), ahead_s,
-                                      novelty != nullptr ? novelty->get() : nullptr, &made));
+    check(maq_prediction_model_create(context.get(), predictor.get(), ahead_s, checks_camera ? 1 : 0, &made));
     own(made);
   }
 };
@@ -29,14 +26,14 @@ inline std::optional<Frame> predicted_frame_of(const PipelineResult& result) {
   return Frame(result.part(frame));
 }
 
-// Nothing if the model does not score novelty.
-inline std::optional<maq_novelty_score> novelty_of(const PipelineResult& result) {
-  maq_novelty_score score{};
-  score.struct_size = sizeof score;
-  const maq_status status = maq_pipeline_result_get_novelty(result.get(), &score);
+// Nothing if the model does not check the camera.
+inline std::optional<maq_camera_health_result> camera_health_of(const PipelineResult& result) {
+  maq_camera_health_result health{};
+  health.struct_size = sizeof health;
+  const maq_status status = maq_pipeline_result_get_camera_health(result.get(), &health);
   if (status == MAQ_ERROR_NOT_FOUND) return std::nullopt;
   check(status);
-  return score;
+  return health;
 }
 
 }  // namespace maquette

@@ -34,7 +34,7 @@ enum class HandleKind : uint32_t {
   kHeadMesh,
   kPredictor,
   kConcealer,
-  kNovelty,
+  kCameraHealth,
   kModel,
   kBody,
   kBodyResult,

@@ -1,4 +1,4 @@
-// Predicts the next frames of a stream. Implementations: motion (blend/), refined (refine/), sampled (sampling/).
+// Predicts the next frames of a stream. Implementations: motion (blend/), sampled (sampling/).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,6 @@ enum class PredictionMethod {
   kAuto,    // the last frame and the motion prediction, blended
   kLast,    // the last frame
   kMotion,  // the motion prediction
-  kRefined,
   kSampled
 };
 

@@ -11,7 +11,7 @@ void add_sources_command(CLI::App& app, int* exit_code);
 void add_doctor_command(CLI::App& app, int* exit_code);
 void add_play_command(CLI::App& app, int* exit_code);
 void add_predict_command(CLI::App& app, int* exit_code);
-void add_novelty_command(CLI::App& app, int* exit_code);
+void add_health_command(CLI::App& app, int* exit_code);
 void add_record_command(CLI::App& app, int* exit_code);
 void add_body_command(CLI::App& app, int* exit_code);
 void add_densepose_command(CLI::App& app, int* exit_code);

@@ -74,22 +74,16 @@ maq_predictor_config network_config(maq_predictor_method method) {
 
 TEST_F(ApiPrediction, NetworksGiveAnotherImageOfTheSameTimeAndSize) {
   maquette::Source source(context_, "stub:people?count=2&seed=3&size=320x240&fps=10&frames=5");
-  maquette::Predictor automatic(context_), refined(context_, network_config(MAQ_PREDICTOR_REFINED)),
-      sampled(context_, network_config(MAQ_PREDICTOR_SAMPLED));
+  maquette::Predictor automatic(context_), sampled(context_, network_config(MAQ_PREDICTOR_SAMPLED));
   while (const auto frame = source.next()) {
-    for (maquette::Predictor* const predictor : {&automatic, &refined, &sampled}) predictor->push(*frame);
+    for (maquette::Predictor* const predictor : {&automatic, &sampled}) predictor->push(*frame);
   }
-  const maquette::Frame base = automatic.predict(0.25), by_refined = refined.predict(0.25),
-                        by_sampled = sampled.predict(0.25);
-  EXPECT_NE(bytes_of(by_refined), bytes_of(by_sampled));
-  for (const maquette::Frame* const frame : {&by_refined, &by_sampled}) {
-    EXPECT_EQ(frame->desc().width_px, 320);
-    EXPECT_EQ(frame->desc().format, base.desc().format);
-    EXPECT_EQ(frame->origin().horizon_ns, 250000000);
-    EXPECT_NE(bytes_of(*frame), bytes_of(base));
-  }
+  const maquette::Frame base = automatic.predict(0.25), by_sampled = sampled.predict(0.25);
+  EXPECT_EQ(by_sampled.desc().width_px, 320);
+  EXPECT_EQ(by_sampled.desc().format, base.desc().format);
+  EXPECT_EQ(by_sampled.origin().horizon_ns, 250000000);
+  EXPECT_NE(bytes_of(by_sampled), bytes_of(base));
   EXPECT_EQ(automatic.stats().networks_ms, 0);
-  EXPECT_GT(refined.stats().networks_ms, 0);
   const auto expect_runs = [](const maquette::Predictor& of, maq_predictor_method method, uint32_t frames,
                               uint32_t cells) {
     const maq_predictor_stats stats = of.stats();
@@ -99,10 +93,7 @@ TEST_F(ApiPrediction, NetworksGiveAnotherImageOfTheSameTimeAndSize) {
     EXPECT_EQ(stats.cell_count, cells) << method;
   };
   expect_runs(automatic, MAQ_PREDICTOR_AUTO, 0, 0);
-  expect_runs(refined, MAQ_PREDICTOR_REFINED, 0, 0);
   expect_runs(sampled, MAQ_PREDICTOR_SAMPLED, 3, 256);
-  refined.predict(0);  // the newest frame itself
-  expect_runs(refined, MAQ_PREDICTOR_LAST, 0, 0);
   EXPECT_EQ(sampled.stats().pushed_count, 5u);
   sampled.reset();
   EXPECT_THROW(sampled.predict(0.1), maquette::Error);
@@ -119,10 +110,6 @@ TEST_F(ApiPrediction, MissingNetworksAndSettingsOutOfRangeAreRefused) {
   };
   refused("no network for sampled", MAQ_ERROR_UNSUPPORTED,
           [](maq_predictor_config& config) { config.model.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle"; });
-  refused("no network for refined", MAQ_ERROR_UNSUPPORTED, [](maq_predictor_config& config) {
-    config.method = MAQ_PREDICTOR_REFINED;
-    config.model.bundle_path = MAQ_TEST_DATA "/tiny_prediction/bundle";
-  });
   refused("/nowhere", MAQ_ERROR_NOT_FOUND, [](maq_predictor_config& config) { config.model.bundle_path = "/nowhere"; });
   for (const float temperature : {-1.0f, std::nanf("")}) {
     refused("temperature", MAQ_ERROR_INVALID_ARGUMENT,
@@ -212,8 +199,7 @@ TEST_F(ApiPrediction, PredictorsThatShareNetworksSampleAsAloneAndOutliveOneAnoth
 }
 
 TEST_F(ApiPrediction, FramesThatWereNotSampledAreRefused) {
-  maquette::Predictor predictor(context_, network_config(MAQ_PREDICTOR_SAMPLED)), automatic(context_),
-      refined(context_, network_config(MAQ_PREDICTOR_REFINED));
+  maquette::Predictor predictor(context_, network_config(MAQ_PREDICTOR_SAMPLED)), automatic(context_);
   maq_frame* made = nullptr;
   std::vector<float> bits(256);
   const auto refused = [&](maq_status status, maq_status expected_status, const char* words) {
@@ -223,9 +209,8 @@ TEST_F(ApiPrediction, FramesThatWereNotSampledAreRefused) {
   };
   constexpr maq_status kWrong = MAQ_ERROR_INVALID_ARGUMENT;
   refused(maq_predictor_sample(predictor.get(), 1, 1, 0.1), kWrong, "No frame was pushed");
-  for (maquette::Predictor* const each : {&predictor, &automatic, &refined}) each->push(frame(0));
+  for (maquette::Predictor* const each : {&predictor, &automatic}) each->push(frame(0));
   refused(maq_predictor_sample(automatic.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "does not sample");
-  refused(maq_predictor_sample(refined.get(), 1, 1, 0.1), MAQ_ERROR_UNSUPPORTED, "does not sample");
   refused(maq_predictor_acquire_sample(automatic.get(), 0, 1, &made), MAQ_ERROR_UNSUPPORTED, "does not sample");
   refused(maq_predictor_sample(predictor.get(), 0, 1, 0.1), kWrong, "sample_count is 0");
   refused(maq_predictor_sample(predictor.get(), 17, 1, 0.1), kWrong, "sample_count is 17");

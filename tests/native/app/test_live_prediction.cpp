@@ -74,58 +74,27 @@ TEST(LivePrediction, ShowsWhatComesBesideWhatIs) {
   EXPECT_EQ(seen[5].number, 6u);
 }
 
-TEST(LivePrediction, NoveltyIsScoredForEachFrameWhileItIsWanted) {
+TEST(LivePrediction, TheCameraIsCheckedWithEachFrameWhileItIsWanted) {
   maquette::PredictionChoice choice;
-  choice.scores_novelty = true;
+  choice.checks_camera = true;
   PredictionRun run(choice);
   run.live.open("stub:people?size=160x120&frames=12");
   ASSERT_TRUE(run.until_ended());
-  EXPECT_EQ(run.live.status().problem, "");
   const maquette::PredictionFrame last = run.seen().back();
-  ASSERT_EQ(last.novelty.size(), 12u);
-  EXPECT_EQ(last.novelty[0].score.is_stream_start, 1);
-  EXPECT_EQ(last.novelty[11].score.is_stream_start, 0);
-  EXPECT_GT(last.novelty[11].time_s, last.novelty[10].time_s);
-  const maq_novelty_score& score = last.novelty[11].score;
-  EXPECT_EQ(last.novelty_bits.size(), size_t(score.rows) * size_t(score.columns));
-  EXPECT_GT(last.novelty_ms, 0);
-  choice.scores_novelty = false;
+  ASSERT_EQ(last.health.size(), 12u);
+  EXPECT_EQ(last.health[0].result.is_stream_start, 1);
+  EXPECT_EQ(last.health[11].result.is_stream_start, 0);
+  EXPECT_EQ(last.health[11].result.event, MAQ_CAMERA_OK);
+  EXPECT_GT(last.health[11].time_s, last.health[10].time_s);
+  const maq_camera_health_result& result = last.health[11].result;
+  EXPECT_EQ(last.health_map.size(), size_t(result.rows) * size_t(result.columns));
+  EXPECT_GT(last.health_ms, 0);
+  choice.checks_camera = false;
   run.live.set_choice(choice);
   run.live.open("stub:people?size=160x120&frames=3");
   ASSERT_TRUE(wait_until([&] { return run.seen().size() == 15; }));
-  EXPECT_TRUE(run.seen().back().novelty.empty());
-  EXPECT_TRUE(run.seen().back().novelty_bits.empty());
-}
-
-TEST(LivePrediction, WithoutTheNetworkOfNoveltyTheImageGoesOn) {
-  maquette::PredictionChoice choice;
-  choice.scores_novelty = true;
-  choice.bundle = "/nowhere";
-  PredictionRun run(choice);
-  run.live.open("stub:people?size=160x120&frames=3");
-  ASSERT_TRUE(run.until_ended());
-  EXPECT_FALSE(run.live.status().has_failed);
-  EXPECT_NE(run.live.status().problem.find("/nowhere"), std::string::npos) << run.live.status().problem;
-  EXPECT_EQ(run.seen().size(), 3u);
-  EXPECT_TRUE(run.seen().back().novelty.empty());
-}
-
-TEST(LivePrediction, ANetworkMendsWhatComesWhereThereIsOne) {
-  maquette::PredictionChoice choice;
-  choice.method = MAQ_PREDICTOR_REFINED;
-  for (const char* const bundle : {MAQ_TEST_DATA "/tiny_transformer/bundle", "/nowhere"}) {
-    choice.bundle = bundle;
-    PredictionRun run(choice);
-    run.live.open("stub:people?size=160x120&frames=12");
-    ASSERT_TRUE(run.until_ended());
-    EXPECT_FALSE(run.live.status().has_failed);
-    const bool is_there = choice.bundle != "/nowhere";
-    EXPECT_EQ(run.live.status().problem.empty(), is_there) << run.live.status().problem;
-    const maquette::PredictionFrame last = run.last();
-    EXPECT_EQ(last.number, 12u);
-    EXPECT_EQ(last.stats.networks_ms > 0, is_there);
-    EXPECT_EQ(maquette::text_of_method(last.stats).find(", refined") != std::string::npos, is_there);
-  }
+  EXPECT_TRUE(run.seen().back().health.empty());
+  EXPECT_TRUE(run.seen().back().health_map.empty());
 }
 
 maquette::PredictionChoice sampling_choice() {

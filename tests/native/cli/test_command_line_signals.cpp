@@ -101,8 +101,8 @@ TEST_F(CommandLineSignals, GiveEachCommandTheExitCodeOfTheTable) {
   cases.emplace_back("record 'stub:pattern?size=16x16&stall=@3' a.maqrec", 0);
   cases.emplace_back("record 'stub:pattern?size=16x16&stall=@0' b.maqrec", 128 + SIGTERM);
   cases.emplace_back("edges 'stub:solids?size=64x48&stall=@2' --out o", 128 + SIGTERM);
-  cases.emplace_back("novelty 'stub:pattern?size=64x48&stall=@2'", 0);
-  cases.emplace_back("novelty 'stub:pattern?size=64x48&stall=@2' --max-frames 9", 128 + SIGTERM);
+  cases.emplace_back("health 'stub:pattern?size=64x48&stall=@2'", 0);
+  cases.emplace_back("health 'stub:pattern?size=64x48&stall=@2' --max-frames 9", 128 + SIGTERM);
   cases.emplace_back("predict 'stub:pattern?size=64x48&stall=@2' --out p", 128 + SIGTERM);
   for (Case& one : cases) {
     const std::string said = one.folder.file("err.txt");

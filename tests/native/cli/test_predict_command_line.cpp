@@ -55,22 +55,6 @@ TEST_F(PredictCommandLine, MotionIsNearerToTheTruthThanTheLastFrame) {
   EXPECT_NEAR(document["frames"][4]["ahead_s"].get<double>(), 0.25, 1e-6);
 }
 
-TEST_F(PredictCommandLine, ANetworkRefinesAuto) {
-  const auto figures = [&](const std::string& arguments) {
-    const Outcome result = run("square.avi --from 12 --frames 2 --compare --json " + arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return nlohmann::json::parse(result.out);
-  };
-  const auto refined = figures("--method refined --out row.mp4 --bundle '" MAQ_TEST_DATA "/tiny_transformer/bundle'");
-  EXPECT_EQ(refined["method"], "refined");
-  EXPECT_EQ(refined["frames"][0]["method"], "refined");
-  EXPECT_NE(refined["frames"][0]["psnr_db"]["chosen"], figures("")["frames"][0]["psnr_db"]["chosen"]);
-  cv::VideoCapture clip(folder_.file("row.mp4"));
-  EXPECT_EQ(clip.get(cv::CAP_PROP_FRAME_WIDTH), 4 * 160) << "truth, last, motion and that";
-  expect_failure("square.avi --compare --method refined --bundle '" MAQ_TEST_DATA "/tiny_prediction/bundle'",
-                 "no network for refined prediction");
-}
-
 TEST_F(PredictCommandLine, PicturesInAFolderAreMarkedInside) {
   const Outcome result = run("square.avi --from 9 --frames 3 --method motion --out pictures");
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -125,7 +109,7 @@ TEST_F(PredictCommandLine, SamplesOfOneSeedAreTheSameAndShownBesideTheTruth) {
     EXPECT_NE(read_text(folder_.file(std::string("pictures/") + name)).find("maquette horizon_ns="), std::string::npos);
   }
   for (const char* wrong :
-       {"--samples 17", "--samples 2 --temperature -1", "--seed 3", "--method refined --temperature 3"}) {
+       {"--samples 17", "--samples 2 --temperature -1", "--seed 3", "--method motion --temperature 3"}) {
     EXPECT_EQ(run(std::string("square.avi --compare ") + wrong).exit_code, 2) << wrong;
   }
   expect_failure("square.avi --compare --frames 65 --samples 1", "--frames 64");

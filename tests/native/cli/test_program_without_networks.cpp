@@ -36,8 +36,7 @@ TEST_F(ProgramWithoutNetworks, EachCommandSaysWhichAreMissingWhereTheyWereLooked
         {"head " MAQ_TEST_MEDIA "/photo.jpg --box 0,0,99,99 --out a.glb", "heads", "heads-int8", "MAQ_HEADS_BUNDLE"},
         {"scene build '" MAQ_TEST_DATA "/tiny_scene/capture' --out a.maqs", "scenes", "scenes-int8",
          "MAQ_SCENE_BUNDLE"},
-        {"novelty " MAQ_TEST_MEDIA "/photo.jpg", "prediction", "prediction-int8", "MAQ_PREDICTION_BUNDLE"},
-        {"predict 'stub:pattern?frames=9' --method refined --compare", "prediction", "prediction-int8",
+        {"predict 'stub:pattern?frames=9' --method sampled --compare", "prediction", "prediction-int8",
          "MAQ_PREDICTION_BUNDLE"}}) {
     const Outcome result = run_alone(arguments);
     EXPECT_EQ(result.exit_code, 1) << arguments;

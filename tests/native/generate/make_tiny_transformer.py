@@ -3,9 +3,8 @@ says of codes.
 
 `bundle`, and `rows_in_bytes.maqr`: its rows as bytes. `foreseen.f32`: little-endian [5][256][2], bits of each code of
 frames 1 to 5 of data/tiny_prediction given those before them, at 10 frames a second. `stream.f32`: [5][256], bits of a
-code by the novelty score, mean of the cell. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
-likeliest given those before it. `mended.f32`: [64][64][3], the refined prediction 0.4 s after frame 2 from frames 0
-to 2 and frame 3 as the extrapolated frame.
+code of a stream, mean of the cell. `likeliest.u8`: [256][2], codes after frames 0 to 2, each the
+likeliest given those before it.
 
     python -m tests.native.generate.make_tiny_transformer
 """
@@ -25,7 +24,6 @@ from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import TransformerTables, transformer_bytes
-from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape, times_ahead
 from export.prediction.table import CodeTable, bits_of_stream
 from export.prediction.transformer import UNSEEN, LatentTransformer
 from tests.native.generate.make_tiny_prediction import tiny
@@ -42,7 +40,7 @@ def frames_before(codes: np.ndarray, t: int) -> np.ndarray:
 
 
 def main() -> None:
-    autoencoder, frames, codes = tiny()
+    autoencoder, _, codes = tiny()
     table = CodeTable.counted(codes[None, :5], SHAPE.entries)
     torch.manual_seed(7)
     net = LatentTransformer(SHAPE).eval()
@@ -52,14 +50,7 @@ def main() -> None:
         net.context.rows.weight[-1] = 0
         net.table.copy_(table.stacked())
     bundle = FOLDER / "bundle"
-    mender = ConvolutionalNet(ConvolutionalShape(widths=(4, 8, 8), blocks=1, kernel=3, motion=True)).eval()
-    with torch.no_grad():
-        for parameter in mender.parameters():
-            parameter.add_(0.05 * torch.randn_like(parameter))
-        times = times_ahead(torch.tensor([FPS]), torch.tensor([4.0]))
-        mended = mender.predicted(torch.from_numpy(frames[None, :4]), times)
-    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net, mender)
-    mended.numpy().astype("<f4").tofile(FOLDER / "mended.f32")
+    export_bundle(autoencoder, table, bundle, BundleInfo("tiny-transformer", "fp32"), net)
     tables = TransformerTables.of(net)
     write_whole(transformer_bytes(tables, row_bytes=1), FOLDER / "rows_in_bytes.maqr")
     stored = read_code_file(bundle / "codes.maqc")

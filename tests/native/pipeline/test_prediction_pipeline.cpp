@@ -1,4 +1,4 @@
-// Prediction and novelty on the pipeline's thread.
+// Prediction and camera health on the pipeline's thread.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -57,26 +57,18 @@ class PredictionPipeline : public testing::Test {
     config.model.threads = 1;
     return maquette::Predictor(context, config);
   }
-  maquette::Novelty novelty() const {
-    maq_novelty_config config = maquette::default_novelty_config();
-    config.model.bundle_path = kTinyNetworks;
-    config.model.threads = 1;
-    config.event_ratio = 1.1f;
-    return maquette::Novelty(context, config);
-  }
-  // Results equal a predictor and a novelty stream of the app.
+  // Results equal a predictor and a check of the app.
   void expect_as_alone(maq_predictor_method method) const {
     Kept kept(context);
     {
       const maquette::Predictor lent = predictor(method);
-      const maquette::Novelty bits = novelty();
-      kept.pipeline.set_model(maquette::PredictionModel(context, lent, 0.15, &bits));
+      kept.pipeline.set_model(maquette::PredictionModel(context, lent, 0.15, true));
     }
     kept.pipeline.set_source(kWalkers);
     ASSERT_TRUE(kept.until_ended());
     ASSERT_EQ(kept.results.size(), 10u);
     maquette::Predictor own = predictor(method);
-    maquette::Novelty own_novelty = novelty();
+    maquette::CameraHealth own_health(context);
     for (const maquette::PipelineResult& result : kept.results) {
       own.push(result.frame);
       const auto predicted = maquette::predicted_frame_of(result);
@@ -85,14 +77,12 @@ class PredictionPipeline : public testing::Test {
       EXPECT_TRUE(predicted->is_predicted());
       EXPECT_EQ(predicted->origin().horizon_ns, 150000000);
       EXPECT_FALSE(result.frame.is_predicted());
-      const maq_novelty_score score = own_novelty.push(result.frame);
-      const auto novelty = maquette::novelty_of(result);
-      ASSERT_TRUE(novelty);
-      EXPECT_EQ(novelty->bits, score.bits);
-      EXPECT_EQ(novelty->ratio, score.ratio);
-      EXPECT_EQ(novelty->is_event, score.is_event);
-      EXPECT_EQ(novelty->is_cut, score.is_cut);
-      EXPECT_EQ(novelty->is_stream_start, score.is_stream_start);
+      const maq_camera_health_result expected = own_health.push(result.frame);
+      const auto health = maquette::camera_health_of(result);
+      ASSERT_TRUE(health);
+      EXPECT_EQ(health->unexplained, expected.unexplained);
+      EXPECT_EQ(health->event, expected.event);
+      EXPECT_EQ(health->is_stream_start, expected.is_stream_start);
       EXPECT_GT(result.run_ms, 0);
     }
     EXPECT_NE(pixels_of(*maquette::predicted_frame_of(kept.results.back())), pixels_of(kept.results.back().frame))
@@ -102,11 +92,11 @@ class PredictionPipeline : public testing::Test {
   const maquette::Context context;
 };
 
-TEST_F(PredictionPipeline, ResultsEqualAPredictorAndANoveltyStreamOfTheApp) { expect_as_alone(MAQ_PREDICTOR_MOTION); }
+TEST_F(PredictionPipeline, ResultsEqualAPredictorAndACheckOfTheApp) { expect_as_alone(MAQ_PREDICTOR_MOTION); }
 
 TEST_F(PredictionPipeline, NetworksAreSharedWithAPredictorThatIsGone) { expect_as_alone(MAQ_PREDICTOR_SAMPLED); }
 
-TEST_F(PredictionPipeline, WithoutNoveltyThereIsNoScoreAndAnotherSourceBeginsAnew) {
+TEST_F(PredictionPipeline, WithoutACheckThereIsNoResultAndAnotherSourceBeginsAnew) {
   Kept kept(context);
   kept.pipeline.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_MOTION), 0.1));
   for (size_t count : {10u, 20u}) {
@@ -117,7 +107,7 @@ TEST_F(PredictionPipeline, WithoutNoveltyThereIsNoScoreAndAnotherSourceBeginsAne
     }));
   }
   for (size_t i = 0; i < 10; ++i) {
-    EXPECT_FALSE(maquette::novelty_of(kept.results[i]));
+    EXPECT_FALSE(maquette::camera_health_of(kept.results[i]));
     EXPECT_EQ(pixels_of(*maquette::predicted_frame_of(kept.results[i])),
               pixels_of(*maquette::predicted_frame_of(kept.results[10 + i])))
         << i;
@@ -139,15 +129,14 @@ TEST_F(PredictionPipeline, ModelsTakeTurns) {
   const auto of_people = live.next(kPatienceNs);
   EXPECT_NE(maquette::densepose_of(*of_people).get(), nullptr);
   EXPECT_FALSE(maquette::predicted_frame_of(*of_people));
-  EXPECT_FALSE(maquette::novelty_of(*of_people));
-  const maquette::Novelty bits = novelty();
+  EXPECT_FALSE(maquette::camera_health_of(*of_people));
   live.stop();
-  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_LAST), 0, &bits));
+  live.set_model(maquette::PredictionModel(context, predictor(MAQ_PREDICTOR_LAST), 0, true));
   live.set_source("stub:people?size=96x72&live=1&fps=200&drop=0.2");
   for (int i = 0; i < 5; ++i) {
     const auto result = live.next(kPatienceNs);
     EXPECT_EQ(pixels_of(*maquette::predicted_frame_of(*result)), pixels_of(result->frame));
-    EXPECT_GE(maquette::novelty_of(*result)->bits, 0);
+    EXPECT_GE(maquette::camera_health_of(*result)->unexplained, 0);
   }
 }
 #endif
@@ -172,8 +161,7 @@ TEST_F(PredictionPipeline, WrongArgumentsAreRefused) {
   const maquette::Predictor right = predictor(MAQ_PREDICTOR_AUTO);
   for (const double wrong : {-0.01, 10.01, std::numeric_limits<double>::quiet_NaN()}) {
     maq_model* model = nullptr;
-    EXPECT_EQ(maq_prediction_model_create(context.get(), right.get(), wrong, nullptr, &model),
-              MAQ_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(maq_prediction_model_create(context.get(), right.get(), wrong, 0, &model), MAQ_ERROR_INVALID_ARGUMENT);
     EXPECT_NE(std::strstr(maq_last_error(nullptr), "ahead_s is"), nullptr) << maq_last_error(nullptr);
   }
 }

@@ -15,10 +15,7 @@ void use_codes(const void* bytes, size_t count) {
   const std::vector<float> features(codes.cells() * codes.groups * codes.width, 0.5f);
   std::vector<uint16_t> found(codes.count());
   nearest.run(features.data(), codes.cells(), found.data());
-  maq::CodeNovelty surprise(codes);
-  std::vector<float> bits(codes.cells());
-  for (int i = 0; i < 2; ++i) surprise.add(found.data(), nullptr, bits.data());
-  for (const float of_place : bits) EXPECT_TRUE(of_place >= 0 && of_place < 17) << of_place;
+  for (const uint16_t code : found) EXPECT_LT(code, codes.entries);
 }
 
 TEST(CodeFiles, DamageAnywhereIsNoticed) {

@@ -173,6 +173,27 @@ TEST(MotionPredictor, WhileNothingMovesItIsTheLastFrame) {
   }
 }
 
+TEST(MotionPredictor, AFrameThatRepeatsTheLastKeepsItsMotionAndTheNextOneStandsStill) {
+  maq::MotionPredictor predictor({maq::PredictionMethod::kMotion, 1});
+  const auto push = [&](double x, int number) {
+    predictor.push(moving_texture::frame(MAQ_PIXEL_GREY8, 320, 240, x, 0, number * 33333333));
+  };
+  for (int i = 0; i < 6; ++i) push(2 * i, i);
+  push(10, 6);  // the frame of 12 is missing
+  maq::Frame later;
+  predictor.predict(33333333, later);
+  EXPECT_EQ(later.timestamp_ns, 7 * 33333333);
+  EXPECT_EQ(later.origin.captured_timestamp_ns, 6 * 33333333);
+  EXPECT_LT(moving_texture::worst_error_px(later, 14, 0, 20), 0.3) << "it goes on as if the frame had come";
+  push(14, 7);
+  predictor.predict(33333333, later);
+  EXPECT_LT(moving_texture::worst_error_px(later, 16, 0, 20), 0.3);
+  push(14, 8);
+  push(14, 9);
+  predictor.predict(66666667, later);
+  EXPECT_LT(moving_texture::worst_error_px(later, 14, 0, 20), 0.05) << "two repeats stand still";
+}
+
 TEST(MotionPredictor, AutoIsTheMethodThatWasRight) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> anywhere(-3, 3);

@@ -27,11 +27,10 @@ def write_labels(folder, other=False):
 
 
 def write_prediction(folder, other=False):
-    """Writes novelty and a predicted image; other: a cell of the image differs by 9 levels."""
+    """Writes camera health and a predicted image; other: a cell of the image differs by 9 levels."""
     folder.mkdir(exist_ok=True)
-    flags = {"event": False, "cut": False}
-    lines = [{"bits": bits, **flags, "stream_start": k == 0} for k, bits in enumerate((8.4, 2.5))]
-    (folder / "novelty.json").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    lines = [{"unexplained": 0.02 * k, "event": "ok", "state": "ok", "stream_start": k == 0} for k in range(2)]
+    (folder / "health.json").write_text("".join(json.dumps(line) + "\n" for line in lines))
     image = np.full((64, 64, 3), 100, np.uint8)
     image[1, 2] += 9 if other else 0
     cv2.imwrite(str(folder / "next.png"), image)

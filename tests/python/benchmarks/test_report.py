@@ -72,14 +72,14 @@ def document():
 
 
 def prediction_document():
-    ahead = [{"frames": n, "last_db": 20.0, "motion_db": 25.0, "dis_db": 24.0, "auto_db": 25.0, "network_db": 26.0,
+    ahead = [{"frames": n, "last_db": 20.0, "motion_db": 25.0, "dis_db": 24.0, "auto_db": 25.0,
               "motion_chosen": 1.0} for n in prediction.HORIZONS]  # fmt: skip
     row = {"film": "pushing 00000, 10 fps", "size_px": [320, 240], "threads": 2, "dis_ms": 9.0, "starts": 3,
            "push_ms": 3.0, "auto_push_ms": 4.0, "predict_ms": 2.0, "cpu_ms": 5.0, "horizons": ahead}  # fmt: skip
     waits = {"captured": 20, "predicted": 5, "wait_ms": {"median": 0.1, "p99": 0.5, "max": 0.6}}
-    surprise = {"frames_a_second": 200.0, "cpu_ms": 4.0, "resize_ms": 0.3, "network_ms": 2.0, "nearest_ms": 0.9}
     return {"rows": [row], "sets": prediction.means_of([row]), "speed": [row | {"film": "street"}], "waits": waits,
-            "novelty": surprise, "missing": ["real clips (<none>)"], "warnings": []}  # fmt: skip
+            "health": {"frames_a_second": 700.0, "push_ms": 1.4, "cpu_ms": 1.5},
+            "missing": ["real clips (<none>)"], "warnings": []}  # fmt: skip
 
 
 def edges_document():

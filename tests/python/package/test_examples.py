@@ -25,7 +25,7 @@ def run(name: str, monkeypatch, *arguments: object) -> None:
 
 @pytest.mark.parametrize(
     ("name", "more"),
-    [("box_size", ["60"]), ("live", []), ("new_view", ["o.png"]), ("novelty", []), ("photo_to_head", ["o.glb"]),
+    [("box_size", ["60"]), ("live", []), ("new_view", ["o.png"]), ("camera_health", []), ("photo_to_head", ["o.glb"]),
      ("photo_to_hint", ["o.png"]), ("photo_to_iuv", ["o"]), ("record", ["o.maqrec"])],
 )  # fmt: skip
 def test_an_example_ends_with_the_sentence_about_a_wrong_input_and_exit_code_1(name, more, tmp_path):
@@ -44,7 +44,7 @@ def test_an_example_ends_with_the_sentence_about_a_wrong_input_and_exit_code_1(n
     [
         ("live", ["stub:people?count=1&size=320x240&frames=3"], "1 person"),
         ("box_size", [MEDIA / "box_depth.png", 56.1], "<Box 4"),
-        ("novelty", ["stub:people?frames=6&size=320x240"], "6 frames"),
+        ("camera_health", ["stub:people?frames=6&size=320x240"], "6 frames"),
     ],
 )
 def test_an_example_prints(name, arguments, printed, monkeypatch, capsys):

@@ -53,7 +53,7 @@ def test_ctrl_c_ends_commands_that_wait_for_a_silent_camera(tmp_path):
         "record": [tmp_path / "a.maqrec"],
         "densepose": ["--out", tmp_path],
         "predict": [],
-        "novelty": [],
+        "health": [],
     }
     children = {
         name: subprocess.Popen([PROGRAM, name, SILENT, *more], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

@@ -22,16 +22,17 @@ RELEASES = sorted(re.findall(r"void (maq_\w+_(?:destroy|release))\(", TEXT))
 
 # Arguments that may be NULL: in every function, or in one.
 MAY_BE_NULL = {"config", "user_data", "release_callback", "preview", "seen_point_count", "version", "library_path",
-               "width_px", "height_px", "maq_edges_model_create curves", "maq_prediction_model_create novelty",
+               "width_px", "height_px", "maq_edges_model_create curves",
                "maq_recorder_create source", "maq_head_builder_add_photo photo", "maq_pipeline_set_model model",
                "maq_pipeline_set_recording path", "maq_edges_fusion_copy_points points",
                "maq_densepose_result_find_pixel distance", "maq_dense_cloud_get_points rgb"}  # fmt: skip
 # Arguments that are looked at after something that the objects of this test lack: cameras, controls, depth, room.
 LATER = {"maq_camera_list_get_camera info", "maq_camera_list_get_mode mode", "maq_source_get_control info",
          "maq_capture_get_drop drop", "maq_capture_load_depth camera", "maq_dense_cloud_create photos",
-         "maq_frame_get_depth desc", "maq_pipeline_result_get_novelty score", "maq_densepose_get_surface surface",
-         "maq_densepose_model_get_surface surface", "maq_densepose_result_draw frame",
-         "maq_densepose_result_draw drawing", "maq_densepose_result_draw rgba"}  # fmt: skip
+         "maq_frame_get_depth desc", "maq_pipeline_result_get_camera_health health",
+         "maq_densepose_get_surface surface", "maq_densepose_model_get_surface surface",
+         "maq_densepose_result_draw frame", "maq_densepose_result_draw drawing",
+         "maq_densepose_result_draw rgba"}  # fmt: skip
 
 NAN = float("nan")
 # Fields of the config with values out of their range, and words of the message where the field is not in it.
@@ -47,8 +48,7 @@ OUT_OF_RANGE = {
     "maq_edges_create": {"result_pool_size": (65,), "average_frames": (-1, 65)},
     "maq_edges_result_find_curves": {
         "min_length_px": (3, 2e6, NAN), "skip_boxes": (2, -1), "focal_tolerance": (-0.1, 0.6, NAN)},
-    "maq_predictor_create": {"method": (5,), "frame_pool_size": (65,)},
-    "maq_novelty_create": {"method": (2,), "event_ratio": (1, 0.5, -4, 1e7, NAN, float("inf"))},
+    "maq_predictor_create": {"method": (4,), "frame_pool_size": (65,)},
     "maq_scene_build": {
         "long_side_px": (-2, 16385), "coefficient_bits": (9,), "min_variation": (-0.5, NAN),
         "visibility_scale visibility scale": (1.01, NAN), "near_depth nearest point": (-1, NAN), "use_held_out": (2,),
@@ -123,8 +123,8 @@ def objects(tmp_path_factory) -> SimpleNamespace:
     create("maq_densepose_texture", n.context, n.ffi.NULL)
     create("maq_model", n.context, n.ffi.NULL, function="maq_densepose_model_create", release="maq_model_destroy")
     n.call("maq_predictor_push", create("maq_predictor", n.context, n.ffi.NULL), frame)
-    novelty = create("maq_novelty", n.context, model("maq_novelty_config", DATA / "tiny_prediction/bundle"))
-    n.call("maq_novelty_push", novelty, frame, n.sized("maq_novelty_score"))
+    health = create("maq_camera_health", n.context)
+    n.call("maq_camera_health_push", health, frame, n.sized("maq_camera_health_result"))
     create("maq_concealer", n.context, made["maq_source"], n.ffi.NULL)
     capture = create("maq_capture", n.context, bytes(DATA / "tiny_scene/capture"), function="maq_capture_open")
     building = model("maq_scene_build_config", DATA / "tiny_scene/bundle")

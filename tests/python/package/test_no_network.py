@@ -29,8 +29,8 @@ COMMANDS = {
     "doctor": [],
     "play": [PEOPLE, "--frames", "2"],
     "record": [PEOPLE, "{}/take.maqrec", "--frames", "2"],
-    "predict": [PEOPLE, "--from", "4", "--frames", "2", "--method", "refined", "--out", "{}/next"],
-    "novelty": [PEOPLE, "--max-frames", "4"],
+    "predict": [PEOPLE, "--from", "4", "--frames", "2", "--method", "sampled", "--out", "{}/next"],
+    "health": [PEOPLE, "--max-frames", "4"],
     "densepose": [f"image:{MEDIA}/photo.jpg?size=256x256", "--out", "{}/people", "--overlay"],
     "edges": [f"image:{MEDIA}/box_depth.png?depth_unit=0.001&fx=600", "--out", "{}/edges", "--overlay", "--boxes",
               "--format", "step,dxf"],
@@ -61,7 +61,7 @@ maquette.Edges(threads=1).run(solids.read(), solids.intrinsics, curves=True)
 predictor = maquette.Predictor()
 predictor.push(frame)
 predictor.predict(0.1)
-maquette.Novelty(threads=1).push(frame)
+maquette.CameraHealth().push(frame)
 with maquette.HeadBuilder(threads=1) as builder:
     try:
         builder.add_photo(np.zeros((64, 64, 3), np.uint8))

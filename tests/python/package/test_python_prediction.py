@@ -126,34 +126,42 @@ def test_only_live_sources_have_gaps():
         maquette.Concealer(maquette.Source("stub:people?frames=3"))
 
 
-def test_a_change_is_novel_in_its_cells():
-    novelty = maquette.Novelty(threads=1)
-    assert novelty.push(textured(0), time_s=0).is_stream_start
+def test_a_change_is_an_object_in_its_cells():
+    health = maquette.CameraHealth()
+    assert health.push(textured(0), time_s=0).is_stream_start
     for number in range(1, 12):
-        still = novelty.push(textured(0), time_s=number * PERIOD_S)
-    assert still.bits < 0.1
-    assert not still.is_event
+        still = health.push(textured(number), time_s=number * PERIOD_S)
+    assert (still.event, still.state) == ("ok", "ok")
+    assert still.unexplained < 0.02
 
-    changed = textured(0)
-    changed[60:90, 80:120] = 255 - changed[60:90, 80:120]
-    score = novelty.push(changed, time_s=12 * PERIOD_S)
-    assert score.map.shape == (16, 16)
-    assert score.map.mean() == pytest.approx(score.bits, rel=1e-4)
-    row, column = np.unravel_index(score.map.argmax(), score.map.shape)
-    assert 8 <= row <= 11
-    assert 8 <= column <= 11
-    assert score.ratio > 2
-    assert novelty.stats["pushed_count"] == 13
+    # Unlike any part of the texture, whose waves are everywhere.
+    blots = np.random.default_rng(0).integers(0, 255, (10, 12, 3), np.uint8).repeat(4, 0).repeat(4, 1)
+    found = []
+    for number in range(12, 18):
+        changed = textured(11)
+        changed[0, 0] = number  # frames that are equal would be a freeze
+        changed[40:80, 60:108] = blots
+        found.append(health.push(changed, time_s=number * PERIOD_S))
+    rows, columns = found[0].map.shape
+    row, column = np.argwhere(found[0].map > 0.5).mean(0)
+    assert 40 < (row + 0.5) * 120 / rows < 80
+    assert 60 < (column + 0.5) * 160 / columns < 108
+    assert [result.event for result in found if result.event != "ok"] == ["object"]
+    event = next(result for result in found if result.event != "ok")
+    assert event.began_s == pytest.approx(12 * PERIOD_S)
+    assert event.x_px == pytest.approx(84, abs=10)
+    assert event.y_px == pytest.approx(60, abs=10)
+    assert health.stats["event_count"] == 1
+    assert "object" in repr(event)
 
 
-def test_streams_share_networks():
-    first = maquette.Novelty(threads=1)
-    second = maquette.Novelty(shared_with=first)
-    bits = [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)]
-    first.close()
-    second.reset()
-    assert [second.push(textured(4 * k), time_s=k * PERIOD_S).bits for k in range(4)] == bits
-    with pytest.raises(TypeError, match="event_ratio"):
-        maquette.Novelty(event_rate=2)
+def test_a_black_camera_has_a_state_until_it_shows_something():
+    health = maquette.CameraHealth()
+    dark = np.full((120, 160, 3), 5, np.uint8)
+    assert health.push(dark, time_s=0).event == "black"
+    assert health.push(dark, time_s=PERIOD_S).state == "black"
+    assert health.push(textured(0), time_s=2 * PERIOD_S).state == "ok"
+    health.reset()
+    assert health.push(textured(0), time_s=3 * PERIOD_S).is_stream_start
     with pytest.raises(ValueError, match="time_s"):
-        second.push(textured(0))
+        health.push(textured(0))

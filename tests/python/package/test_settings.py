@@ -19,7 +19,7 @@ for result in maquette.Pipeline("camera:", maquette.DensePoseModel()):
     print(len(result.people), maquette.Edges().run("a.png", maquette.Intrinsics.centred(4, 3, focal_px=5)).curves.boxes)
 maquette.Source("a.mp4", loop=1, queue_length=2)
 maquette.HeadBuilder(texture=True, texture_px=512).fit(seconds=3, progress=lambda done, stage: done < 0.5)
-maquette.Predictor("refined").push(maquette.Frame(np.zeros((4, 6, 3), np.uint8)))
+maquette.Predictor("sampled").push(maquette.Frame(np.zeros((4, 6, 3), np.uint8)))
 maquette.Pipeline("camera:", maquette.EdgesModel(curves=True, curve_settings={"min_length_px": 8}), nice=5)
 with maquette.ClipWriter("a.mp4", 30) as clip:
     clip.add("a.png")
@@ -76,7 +76,7 @@ def test_the_package_itself_has_types():
         ),
         (lambda: maquette.DensePose(long_side_px="384"), TypeError, "long_side_px is '384'; .* type int32_t"),
         (lambda: maquette.DensePose(threads=2**40), TypeError, "threads is 1099511627776"),
-        (lambda: maquette.Predictor("motoin"), ValueError, "auto, last, motion, refined, sampled"),
+        (lambda: maquette.Predictor("motoin"), ValueError, "auto, last, motion, sampled"),
         (lambda: maquette.Source("stub:pattern").control("zoom"), ValueError, 'control is "zoom"; it is one of auto_e'),
     ],
 )

@@ -18,7 +18,9 @@ def test_a_pipeline_gives_people_and_ends():
     with maquette.Pipeline(PEOPLE, model) as pipeline:
         results = []
         for result in pipeline:
-            results.append((result.frame.sequence, result.densepose, result.edges, result.predicted, result.novelty))
+            results.append(
+                (result.frame.sequence, result.densepose, result.edges, result.predicted, result.camera_health)
+            )
             assert result.stats["run_ms"] > 0
             result.densepose.save  # noqa: B018
             assert len(result.people) == 1
@@ -43,12 +45,12 @@ def test_a_pipeline_gives_edges_with_curves():
     assert np.asarray(frame).shape == (240, 320)  # a part keeps the whole
 
 
-def test_a_pipeline_predicts_and_scores():
-    model = maquette.PredictionModel(maquette.Predictor("motion"), 0.1, maquette.Novelty(method="bigram"))
+def test_a_pipeline_predicts_and_checks_the_camera():
+    model = maquette.PredictionModel(maquette.Predictor("motion"), 0.1, checks_camera=True)
     with maquette.Pipeline(PEOPLE, model) as pipeline:
-        ahead = [(result.predicted.origin.horizon_s, result.novelty.bits) for result in pipeline]
+        ahead = [(result.predicted.origin.horizon_s, result.camera_health.event) for result in pipeline]
     assert [horizon for horizon, _ in ahead] == pytest.approx([0.1] * len(ahead))
-    assert all(bits >= 0 for _, bits in ahead)
+    assert {event for _, event in ahead} == {"ok"}
 
 
 def test_a_pipeline_calls_back_records_and_pauses(tmp_path):

@@ -17,7 +17,7 @@ from export.prediction.autoencoder import Autoencoder
 from export.prediction.codebook import Codebook, used_fraction
 from export.prediction.config import AUTOENCODERS, AutoencoderShape
 from export.prediction.data import read_stills, varied
-from export.prediction.refiner.image_error import horizon_figures, psnr_db
+from export.prediction.image_error import horizon_figures, psnr_db
 from export.training import seed_step
 
 SMALL = AutoencoderShape(widths=(8, 16), residual=8, blocks=1, slices=2, entries=16)

@@ -1,4 +1,4 @@
-"""Bits of frames by the transformer through the C API are those of torch, with the image that motion predicts."""
+"""Samples of the transformer through the C API are those of the reference, with the image that motion predicts."""
 
 import math
 from pathlib import Path
@@ -17,15 +17,14 @@ from code_sampler import drawn_code
 from export.bundle import BundleInfo
 from export.clips.shapes import shapes_clip
 from export.prediction.bundle import TRANSFORMER
-from export.prediction.code_file import FrameCodes, prior_of, read_code_file
+from export.prediction.code_file import prior_of, read_code_file
 from export.prediction.config import TransformerShape
 from export.prediction.export_onnx import export_bundle
 from export.prediction.graphs.graph_runtime import GraphRuntime
 from export.prediction.graphs.transformer_file import read_transformer_file
-from export.prediction.motion_images import MotionJob, motion_pictures
-from export.prediction.table import CodeTable, bits_of_stream
+from export.prediction.table import CodeTable
 from export.prediction.train_autoencoder import load_autoencoder
-from export.prediction.transformer import UNSEEN, LatentTransformer
+from export.prediction.transformer import LatentTransformer
 
 WEIGHTS = Path("export/weights/prediction-autoencoder.pt")
 FPS = 15.0
@@ -54,51 +53,6 @@ def made(tmp_path_factory):
     stored = read_code_file(folder / "codes.maqc")
     net.table.copy_(torch.from_numpy(prior_of(stored)))  # as a runtime has it
     return folder, autoencoder, net, stored, frames, codes
-
-
-@torch.no_grad()
-def stream_bits(net: LatentTransformer, stored: FrameCodes, codes: torch.Tensor, motion: torch.Tensor) -> np.ndarray:
-    """[T - 1, 16, 16]. motion [T, slices, 16, 16]: what motion predicts of each frame, UNSEEN where nothing."""
-    predictions = []
-    for t in range(1, len(codes)):
-        seen = codes[max(0, t - 3) : t]
-        unseen = torch.full((3 - len(seen), *codes.shape[1:]), UNSEEN)
-        before = torch.cat([unseen, seen, motion[t : t + 1]])[None]
-        logits = net(before, codes[t : t + 1], torch.tensor([FPS]))[0]
-        likely = logits.double().log_softmax(-1).gather(-1, codes[t].flatten(1)[..., None])[..., 0]
-        predictions.append(-likely.view(codes.shape[1:]).numpy() / math.log(2))
-    return bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy(), np.stack(predictions)).mean(1)
-
-
-def bits_of(novelty: maquette.Novelty, frames: np.ndarray) -> np.ndarray:
-    """[T - 1, 16, 16]."""
-    return np.stack([novelty.push(np.ascontiguousarray(f), time_s=t / FPS).map for t, f in enumerate(frames)])[1:]
-
-
-def test_cells_have_the_bits_of_torch_with_the_prediction_of_motion(made):
-    folder, autoencoder, net, stored, frames, codes = made
-    pictures = motion_pictures(MotionJob(0, frames, FPS))[:, 0]
-    motion = torch.full_like(codes, UNSEEN)
-    motion[2:] = autoencoder.encode(torch.from_numpy(pictures[1:-1]))
-    expected = stream_bits(net, stored, codes, motion)
-    without = stream_bits(net, stored, codes, torch.full_like(codes, UNSEEN))
-    novelty = maquette.Novelty(bundle_path=folder, threads=1)
-    found = bits_of(novelty, frames)
-    # Every cell depends on all codes of three frames; one in a thousand of these may differ by a near tie.
-    assert np.median(np.abs(found - expected)) < 1e-3
-    assert np.mean(np.abs(found - expected) < 0.02) >= 0.99
-    assert np.median(np.abs(found - without)[2:]) > 0.01, "what motion predicts is seen"
-    assert novelty.stats["transformer_ms"] > 0
-
-
-def test_the_table_alone_can_be_asked_for(made):
-    folder, _, _, stored, frames, codes = made
-    novelty = maquette.Novelty(bundle_path=folder, threads=1, method="bigram")
-    expected = bits_of_stream(stored.frequency_bits, stored.after_bits, codes.numpy()).mean(1)
-    assert np.mean(np.abs(bits_of(novelty, frames) - expected) < 1e-3) >= 0.99
-    assert novelty.stats["transformer_ms"] == 0
-    sharing = maquette.Novelty(shared_with=novelty)
-    assert np.mean(np.abs(bits_of(sharing, frames) - expected) < 1e-3) >= 0.99
 
 
 def test_samples_of_a_seed_are_those_of_the_reference(made):

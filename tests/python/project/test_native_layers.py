@@ -32,7 +32,7 @@ SYSTEMS = (
     | DENSEPOSE
     | {"densepose", "edges/files", "edges/fusion", "edges/measuring", "head/reconstruction", "head/bundle",
        "head/files", "head/render", "prediction", "prediction/blend", "prediction/codec", "prediction/flow",
-       "prediction/novelty", "prediction/refine", "prediction/sampling", "prediction/transformer", "sources",
+       "prediction/health", "prediction/sampling", "prediction/transformer", "sources",
        "sources/recording"}
 )  # fmt: skip
 MAY_INCLUDE = {
@@ -82,9 +82,7 @@ MAY_INCLUDE = {
     "prediction/blend": {"core", "image", "prediction", "prediction/flow"},
     "prediction/codec": BASE,
     "prediction/transformer": BASE | {"prediction", "prediction/blend", "prediction/codec"},
-    "prediction/novelty": BASE | {"prediction/codec", "prediction/transformer"},
-    "prediction/refine": BASE | {"prediction", "prediction/blend", "prediction/codec", "prediction/flow",
-                                 "prediction/transformer"},
+    "prediction/health": {"core", "image", "prediction/flow"},
     "prediction/sampling": BASE | {"prediction", "prediction/blend", "prediction/codec", "prediction/flow",
                                    "prediction/transformer"},
     "scene": BASE - {"nn"},

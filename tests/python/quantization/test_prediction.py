@@ -1,8 +1,6 @@
 """An int8 bundle of prediction has the codes and images of the fp32 one, nearly."""
 
 import json
-import shutil
-from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -21,13 +19,10 @@ from export.prediction.bundle import CODES, TRANSFORMER
 from export.prediction.codes import CodedClips, write_codes
 from export.prediction.config import AutoencoderShape, TransformerShape
 from export.prediction.export_onnx import export_bundle
-from export.prediction.refiner.convolutional import ConvolutionalNet, ConvolutionalShape
 from export.prediction.table import CodeTable
 from export.prediction.transformer import LatentTransformer
-from quantization import prediction, prediction_refiner
-from quantization.settings import PREDICTION, PredictionSettings, read_settings
+from quantization import prediction
 
-TINY = Path("tests/native/data/tiny_transformer/bundle")
 SMALL = AutoencoderShape(widths=(16, 32), residual=16, blocks=1, slices=2, entries=16)
 
 
@@ -122,29 +117,3 @@ def test_int8_keeps_codes_images_and_bits(tmp_path, monkeypatch):
     (int8 / CODES).write_bytes(b"others")
     with pytest.raises(SystemExit, match="other codes"):
         prediction.main()
-
-
-def test_the_refiner_is_put_into_a_bundle_whose_rest_stays(tmp_path):
-    bundle = tmp_path / "bundle"
-    shutil.copytree(TINY, bundle)
-    before = {path.name: path.read_bytes() for path in bundle.iterdir()}
-    rng = np.random.default_rng(0)
-    for split in ("train", "val"):
-        folder = tmp_path / "auto/shapes" / split
-        folder.mkdir(parents=True)
-        frames = np.repeat(rng.integers(0, 255, (1, 64, 64, 3), np.uint8), 16, 0)
-        predictions = np.repeat(frames[:, None] // 2, 5, 1)
-        np.savez(folder / "clip-00000.npz", frames=frames, predictions=predictions, fps=10.0)
-    torch.manual_seed(0)
-    shape = ConvolutionalShape(widths=(4, 8, 8), blocks=1, kernel=3, motion=True)
-    weights = tmp_path / "weights.pt"
-    torch.save({"shape": asdict(shape), "net": ConvolutionalNet(shape).state_dict()}, weights)
-    settings = replace(read_settings(PREDICTION, PredictionSettings), frames=5, held_out_frames=5)
-    manifest = prediction_refiner.put_refined(weights, bundle, tmp_path / "auto", ["shapes"], settings)
-    after = {path.name: path.read_bytes() for path in bundle.iterdir()}
-    assert {name for name in after if after[name] != before[name]} == {"mended.onnx", "manifest.json"}
-    assert manifest["mended"] == {"before": 3, "max_ahead": 12, "fps": [10, 30]}
-    assert manifest["training_data"] == json.loads(before["manifest.json"])["training_data"]
-    cost = manifest["measured"]["int8_cost"]
-    assert cost["mended_db_fp32"] > cost["foreseen_db"] + 0.1, "a twentieth of the last frame, which is right"
-    assert cost["mended_db_int8"] == pytest.approx(cost["mended_db_fp32"], abs=0.3)

@@ -22,28 +22,19 @@ maq_predictor_config default_predictor_config() {
   return config;
 }
 
-bool has_networks(PredictionMethod method) {
-  return method == PredictionMethod::kRefined || method == PredictionMethod::kSampled;
-}
-
 // Throws the exceptions of opening networks; MAQ_ERROR_UNSUPPORTED if the bundle has none for the method.
 void open_networks(ContextState& state, const maq_predictor_config& config, PredictorRecipe& recipe) {
   const CodeBundle bundle(read_bundle_argument(config.model, "config.model", kPredictorBundle));
   SessionSettings settings;
   settings.threads = recipe.motion.threads;
   settings.provider = config.model.provider;
-  const bool is_refined = recipe.method == PredictionMethod::kRefined;
-  if (is_refined ? !ResidualRefiner::is_in(bundle) : !TransformerBundle::is_in(bundle)) {
-    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name, " has no network for ",
-                is_refined ? "refined" : "sampled", " prediction; use another bundle or method.");
+  if (!TransformerBundle::is_in(bundle)) {
+    throw Error(MAQ_ERROR_UNSUPPORTED, "Bundle ", bundle.bundle.manifest.name,
+                " has no network for sampled prediction; use another bundle or method.");
   }
-  const auto encoder = std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, settings);
-  if (is_refined) {
-    recipe.refiner = {encoder, std::make_shared<ResidualRefiner>(state.onnxruntime(), bundle, settings)};
-  } else {
-    recipe.sampler = {encoder, std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, settings),
-                      std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, settings)};
-  }
+  recipe.sampler = {std::make_shared<FrameEncoder>(state.onnxruntime(), bundle, settings),
+                    std::make_shared<FrameDecoder>(state.onnxruntime(), bundle, settings),
+                    std::make_shared<CodeTransformer>(state.onnxruntime(), bundle, settings)};
 }
 
 void adopt_networks(const maq_predictor* other, PredictorRecipe& recipe) {
@@ -51,7 +42,6 @@ void adopt_networks(const maq_predictor* other, PredictorRecipe& recipe) {
   if (other->recipe.method != recipe.method) {
     throw ArgumentError("config.shared_with has another method than config.method; give both the same.");
   }
-  recipe.refiner = other->recipe.refiner;
   recipe.sampler = other->recipe.sampler;
 }
 
@@ -62,7 +52,7 @@ PredictorRecipe recipe_of(ContextState& state, const maq_predictor_config& confi
   recipe.method = method_of(config.method);
   recipe.motion.threads = config.model.threads != 0 ? config.model.threads : default_threads();
   recipe.motion.workspaces = state.motion_workspaces();
-  if (!has_networks(recipe.method)) {
+  if (recipe.method != PredictionMethod::kSampled) {
     if (config.shared_with != nullptr) {
       throw ArgumentError("config.shared_with is given, but config.method has no networks to share.");
     }
@@ -74,10 +64,8 @@ PredictorRecipe recipe_of(ContextState& state, const maq_predictor_config& confi
   } else {
     open_networks(state, config, recipe);
   }
-  if (recipe.method == PredictionMethod::kSampled) {
-    recipe.sampling = {config.temperature, config.seed};
-    const CodeSampler checked(recipe.sampling, recipe.sampler.encoder->codes().entries);
-  }
+  recipe.sampling = {config.temperature, config.seed};
+  const CodeSampler checked(recipe.sampling, recipe.sampler.encoder->codes().entries);
   return recipe;
 }
 
@@ -95,12 +83,8 @@ SampledPredictor& sampled(const maq_predictor* predictor) {
 namespace maq {
 
 std::unique_ptr<FramePredictor> make_predictor(const PredictorRecipe& recipe) {
-  switch (recipe.method) {
-    case PredictionMethod::kRefined: return std::make_unique<RefinedPredictor>(recipe.refiner, recipe.motion);
-    case PredictionMethod::kSampled:
-      return std::make_unique<SampledPredictor>(recipe.sampler, recipe.sampling, recipe.motion);
-    default: return std::make_unique<MotionPredictor>(recipe.motion);
-  }
+  if (recipe.method != PredictionMethod::kSampled) return std::make_unique<MotionPredictor>(recipe.motion);
+  return std::make_unique<SampledPredictor>(recipe.sampler, recipe.sampling, recipe.motion);
 }
 
 }  // namespace maq

@@ -6,12 +6,11 @@
 
 #include "api/frame_handle.h"
 #include "api/handle.h"
-#include "maquette/novelty.h"
+#include "maquette/camera_health.h"
 #include "maquette/prediction.h"
 #include "prediction/codec/frame_decoder.h"
 #include "prediction/frame_predictor.h"
-#include "prediction/novelty/novelty.h"
-#include "prediction/refine/refined_predictor.h"
+#include "prediction/health/camera_health.h"
 #include "prediction/sampling/sampled_predictor.h"
 
 namespace maq {
@@ -21,18 +20,13 @@ struct PredictorRecipe {
   PredictionMethod method = PredictionMethod::kAuto;
   MotionSettings motion;
   SamplingSettings sampling;  // kSampled
-  RefinerNetworks refiner;    // kRefined
   SamplerNetworks sampler;    // kSampled
 };
 
 std::unique_ptr<FramePredictor> make_predictor(const PredictorRecipe& recipe);
 
-// Shared by novelty streams.
-struct NoveltyNetworks {
-  std::shared_ptr<FrameEncoder> encoder;
-  std::shared_ptr<FrameDecoder> decoder;
-  std::shared_ptr<CodeTransformer> transformer;  // null: the bigram prior
-};
+// `match`: of the same frame.
+maq_camera_health_result result_of(const HealthResult& found, const Frame& frame, const PictureMatch& match);
 
 }  // namespace maq
 
@@ -51,21 +45,8 @@ struct maq_predictor : maq::HandleOf<maq::HandleKind::kPredictor> {
   maq::BoundedPool<maq_frame> frames;
 };
 
-struct maq_novelty : maq::HandleOf<maq::HandleKind::kNovelty> {
-  maq_novelty(std::shared_ptr<maq::ContextState> of, maq::NoveltyNetworks networks, float ratio)
-      : state(std::move(of)),
-        novelty(std::move(networks.encoder), std::move(networks.transformer)),
-        decoder(std::move(networks.decoder)),
-        event_ratio(ratio) {}
-  std::shared_ptr<maq::ContextState> state;
-  maq::Novelty novelty;
-  std::shared_ptr<maq::FrameDecoder> decoder;
-  maq::BoundedPool<maq_frame> reconstructions{4, "reconstructions"};
-  // The latest frame:
-  int64_t timestamp_ns = 0;
-  uint64_t sequence = 0;
-  maq_clock clock = MAQ_CLOCK_MEDIA;
-  const float event_ratio;
+struct maq_camera_health : maq::HandleOf<maq::HandleKind::kCameraHealth> {
+  maq::CameraHealth health;
   float push_ms = 0;
   uint64_t pushed = 0, events = 0, starts = 0;
 };

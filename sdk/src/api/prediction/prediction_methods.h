@@ -8,7 +8,6 @@ namespace maq {
 
 static_assert(int(PredictionMethod::kAuto) == MAQ_PREDICTOR_AUTO && int(PredictionMethod::kLast) == MAQ_PREDICTOR_LAST);
 static_assert(int(PredictionMethod::kMotion) == MAQ_PREDICTOR_MOTION);
-static_assert(int(PredictionMethod::kRefined) == MAQ_PREDICTOR_REFINED);
 static_assert(int(PredictionMethod::kSampled) == MAQ_PREDICTOR_SAMPLED);
 
 // The value is in range.

@@ -1,6 +1,7 @@
 #include "prediction/blend/motion_predictor.h"
 
 #include <algorithm>
+#include <cstring>
 #include <optional>
 #include <utility>
 
@@ -24,6 +25,22 @@ std::optional<int64_t> interval(int64_t from_ns, int64_t to_ns) {
   return found;
 }
 
+// Repeats in a row that are taken for missing frames. From the next on, nothing moves.
+constexpr int kMaxRepeats = 1;
+
+bool has_same_pixels(const ImageView& one, const ImageView& other) {
+  for (int plane = 0; plane < plane_count(one.format); ++plane) {
+    const size_t bytes = row_bytes(one.format, plane, one.width_px);
+    const uint8_t *row = one.planes[plane].data, *other_row = other.planes[plane].data;
+    for (int y = 0; y < plane_rows(one.format, plane, one.height_px); ++y) {
+      if (std::memcmp(row, other_row, bytes) != 0) return false;
+      row += one.planes[plane].stride_bytes;
+      other_row += other.planes[plane].stride_bytes;
+    }
+  }
+  return true;
+}
+
 bool is_same_kind(const ImageView& one, const ImageView& other) {
   return one.format == other.format && one.width_px == other.width_px && one.height_px == other.height_px;
 }
@@ -37,7 +54,8 @@ MotionWorkspaces::Borrowed MotionPredictor::borrow() {
 }
 
 void MotionPredictor::reset() {
-  has_frame_ = has_before_ = moves_ = false;
+  has_frame_ = has_before_ = moves_ = is_repeat_ = false;
+  repeats_ = 0;
   interval_ns_ = 0;
   blend_weights_.reset();
 }
@@ -45,10 +63,14 @@ void MotionPredictor::reset() {
 bool MotionPredictor::continues(const Frame& frame) {
   is_again_ = false;
   if (!has_frame_) return true;
-  const std::optional<int64_t> since = interval(newest_.timestamp_ns, frame.timestamp_ns);
+  const std::optional<int64_t> since = interval(latest_ns_, frame.timestamp_ns);
   if (!since || !is_same_kind(frame.image, newest_.image) || frame.clock != newest_.clock) return false;
-  is_again_ = since == 0;
+  is_again_ = since == 0 && !is_repeat_;
   return true;
+}
+
+bool MotionPredictor::is_lone_repeat(const Frame& frame) const {
+  return has_frame_ && moves_ && !is_again_ && repeats_ < kMaxRepeats && has_same_pixels(frame.image, newest_.image);
 }
 
 void MotionPredictor::keep(const Frame& frame) {
@@ -58,6 +80,15 @@ void MotionPredictor::keep(const Frame& frame) {
     reset();
     ++stats_.resets;
   }
+  is_repeat_ = is_lone_repeat(frame);
+  latest_ns_ = frame.timestamp_ns;
+  if (is_repeat_) {
+    ++repeats_;
+    newest_.sequence = frame.sequence;
+    stats_.push_ms = float(whole.elapsed_ms());
+    return;
+  }
+  repeats_ = 0;
   if (has_frame_ && !is_again_) {
     if (has_luma_) {
       before_luma_.resize(newest_luma_.size());
@@ -86,7 +117,7 @@ void MotionPredictor::follow() {
   if (!has_frame_) return;
   const Stopwatch whole;
   stats_.luma_ms = stats_.flow_ms = stats_.weights_ms = 0;
-  if (settings_.method != PredictionMethod::kLast) find_motion(*borrow());
+  if (settings_.method != PredictionMethod::kLast && !is_repeat_) find_motion(*borrow());
   ++stats_.pushed;
   stats_.push_ms += float(whole.elapsed_ms());
 }
@@ -137,7 +168,7 @@ void MotionPredictor::predict(int64_t ahead_ns, Frame& frame) {
   const CellWeights* weights = nullptr;
   float motion_fraction = method == PredictionMethod::kLast ? 0.0f : 1.0f;
   if (method == PredictionMethod::kAuto) {
-    weights = &blend_weights_.at(ahead_ns);
+    weights = &blend_weights_.at(ahead_ns + latest_ns_ - newest_.timestamp_ns);
     motion_fraction = weights->mean;
     if (motion_fraction == 0) method = PredictionMethod::kLast;
     if (motion_fraction == 1) method = PredictionMethod::kMotion, weights = nullptr;
@@ -147,7 +178,8 @@ void MotionPredictor::predict(int64_t ahead_ns, Frame& frame) {
   uint8_t* const pixels = frame.allocate(image.format, image.width_px, image.height_px);
   stats_.project_ms = 0;
   if (method != PredictionMethod::kLast) {
-    const float intervals = float(double(ahead_ns) / double(interval_ns_));
+    const int64_t since_newest_ns = ahead_ns + latest_ns_ - newest_.timestamp_ns;
+    const float intervals = float(double(since_newest_ns) / double(interval_ns_));
     const MotionWorkspaces::Borrowed work = borrow();
     flow_.unpack(work->flow);
     const FlowField& field = work->extrapolation.project(work->flow, intervals);
@@ -157,10 +189,10 @@ void MotionPredictor::predict(int64_t ahead_ns, Frame& frame) {
     copy_packed(image, pixels);
   }
   stats_.warp_ms = float(stage.lap_ms());
-  if (__builtin_add_overflow(newest_.timestamp_ns, ahead_ns, &frame.timestamp_ns)) frame.timestamp_ns = INT64_MAX;
+  if (__builtin_add_overflow(latest_ns_, ahead_ns, &frame.timestamp_ns)) frame.timestamp_ns = INT64_MAX;
   frame.clock = newest_.clock;
   frame.sequence = newest_.sequence;
-  frame.origin = {true, newest_.timestamp_ns, newest_.sequence, ahead_ns};
+  frame.origin = {true, latest_ns_, newest_.sequence, ahead_ns};
   stats_.method = method;
   stats_.motion_fraction = motion_fraction;
   ++stats_.predicted;

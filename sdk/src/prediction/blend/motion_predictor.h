@@ -43,6 +43,8 @@ class MotionPredictor final : public FramePredictor {
 
  private:
   MotionWorkspaces::Borrowed borrow();
+  // Whether the frame is a copy of the newest one, as sources send that lack a frame. More of them stand still.
+  bool is_lone_repeat(const Frame& frame) const;
   // Returns whether the frame continues the stream; otherwise the stream was reset.
   bool continues(const Frame& frame);
   void find_motion(MotionWorkspace& work);
@@ -53,6 +55,9 @@ class MotionPredictor final : public FramePredictor {
   Frame newest_;  // the image in its own memory, and one byte more
   bool has_frame_ = false;
   bool is_again_ = false;    // the newest frame replaced one with the same time
+  bool is_repeat_ = false;   // the latest push repeated the newest frame, whose motion goes on
+  int repeats_ = 0;          // such pushes in a row
+  int64_t latest_ns_ = 0;    // time of the latest push; later than the newest frame's after a repeat
   bool has_luma_ = false;    // newest_luma_ belongs to the newest frame
   bool has_before_ = false;  // before_luma_ belongs to the frame before the newest one
   int64_t before_ns_ = 0;    // time of that frame

@@ -4,16 +4,14 @@
 
 namespace maq {
 
-template <class Value>
-void FrameHistory<Value>::add(const Value* values, int64_t time_ns) {
+void CodeHistory::add(const uint16_t* values, int64_t time_ns) {
   std::copy_n(values, count_, values_.data() + next_ * count_);
   times_ns_[next_] = time_ns;
   next_ = (next_ + 1) % kKept;
   size_ = std::min(size_ + 1, kKept);
 }
 
-template <class Value>
-void FrameHistory<Value>::select(int64_t target_ns, size_t wanted, const Value** frames) const {
+void CodeHistory::select(int64_t target_ns, size_t wanted, const uint16_t** frames) const {
   std::fill_n(frames, wanted, nullptr);
   if (size_ == 0 || wanted == 0) return;
   frames[wanted - 1] = at(0).values;
@@ -30,8 +28,5 @@ void FrameHistory<Value>::select(int64_t target_ns, size_t wanted, const Value**
     frames[wanted - 1 - k] = at(age).values;
   }
 }
-
-template class FrameHistory<uint16_t>;
-template class FrameHistory<uint8_t>;
 
 }  // namespace maq

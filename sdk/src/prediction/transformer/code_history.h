@@ -1,4 +1,4 @@
-// Keeps the latest frames of a stream with their times: codes, or small images.
+// Keeps the codes of the latest frames of a stream with their times.
 #pragma once
 
 #include <array>
@@ -8,27 +8,25 @@
 
 namespace maq {
 
-// `Value`: uint16_t or uint8_t.
-template <class Value>
-class FrameHistory {
+class CodeHistory {
  public:
   static constexpr size_t kKept = 16;
 
   // `count`: values per frame.
-  explicit FrameHistory(size_t count) : count_(count), values_(kKept * count) {}
+  explicit CodeHistory(size_t count) : count_(count), values_(kKept * count) {}
 
-  void add(const Value* values, int64_t time_ns);
+  void add(const uint16_t* values, int64_t time_ns);
   void clear() { size_ = 0; }
 
   size_t size() const { return size_; }
   int64_t newest_ns() const { return at(0).time_ns; }
   // Selects `wanted` frames into `frames`, the oldest first. Their spacing is the time from the newest frame to
   // `target_ns`; each may be off by half of that, so that frames may be missing. Null from the first missing one back.
-  void select(int64_t target_ns, size_t wanted, const Value** frames) const;
+  void select(int64_t target_ns, size_t wanted, const uint16_t** frames) const;
 
  private:
   struct Known {
-    const Value* values;
+    const uint16_t* values;
     int64_t time_ns;
   };
   // `age`: 0 is the newest.
@@ -38,12 +36,9 @@ class FrameHistory {
   }
 
   size_t count_;
-  std::vector<Value> values_;
+  std::vector<uint16_t> values_;
   std::array<int64_t, kKept> times_ns_{};
   size_t next_ = 0, size_ = 0;
 };
-
-using CodeHistory = FrameHistory<uint16_t>;
-using ImageHistory = FrameHistory<uint8_t>;
 
 }  // namespace maq

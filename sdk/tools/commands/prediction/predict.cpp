@@ -38,9 +38,7 @@ struct PredictOptions {
   std::string out;
   SampleOptions sampling;
 
-  bool needs_networks() const {
-    return method == MAQ_PREDICTOR_REFINED || method == MAQ_PREDICTOR_SAMPLED || sampling.samples > 0;
-  }
+  bool needs_networks() const { return method == MAQ_PREDICTOR_SAMPLED || sampling.samples > 0; }
 };
 
 constexpr int64_t kDefaultFrom = 30;
@@ -301,12 +299,11 @@ void add_frame_options(CLI::App& command, PredictOptions& options) {
   const std::map<std::string, maq_predictor_method> methods = {{"auto", MAQ_PREDICTOR_AUTO},
                                                                {"last", MAQ_PREDICTOR_LAST},
                                                                {"motion", MAQ_PREDICTOR_MOTION},
-                                                               {"refined", MAQ_PREDICTOR_REFINED},
                                                                {"sampled", MAQ_PREDICTOR_SAMPLED}};
   command
       .add_option("-m,--method", options.method,
                   "last: the last frame. motion: every pixel continues its motion. auto (default): both, blended by "
-                  "their past errors. refined: auto, refined by a network. sampled: one possible future")
+                  "their past errors. sampled (research): one possible future")
       ->transform(CLI::CheckedTransformer(methods));
   command.add_flag("-c,--compare", options.compare,
                    "Print the errors (PSNR) by time ahead, and show truth and methods side by side");
@@ -352,7 +349,6 @@ void add_predict_command(CLI::App& app, int* exit_code) {
       "  maquette predict clip.mp4 --from 40 --frames 16 --compare --out next.mp4\n"
       "  maquette predict clip.mp4 --from 40 --compare            # print the errors only\n"
       "  maquette predict 'stub:people?count=2' --method motion --out next/\n"
-      "  maquette predict clip.mp4 --method refined --compare --out refined.mp4\n"
       "  maquette predict clip.mp4 --samples 4 --temperature 0.7 --seed 3 --compare --out futures.mp4\n"
       "  maquette predict v4l2:/dev/video0 --from 60 --frames 10 --out next.mp4");
   command->callback([=] {

@@ -51,7 +51,6 @@ const char* name_of(maq_predictor_method method) {
   switch (method) {
     case MAQ_PREDICTOR_LAST: return "last";
     case MAQ_PREDICTOR_MOTION: return "motion";
-    case MAQ_PREDICTOR_REFINED: return "refined";
     case MAQ_PREDICTOR_SAMPLED: return "sampled";
     default: return "auto";
   }

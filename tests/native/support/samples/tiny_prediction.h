@@ -8,7 +8,7 @@
 
 #include "core/log.h"
 #include "prediction/codec/frame_decoder.h"
-#include "prediction/novelty/novelty.h"
+#include "prediction/codec/frame_encoder.h"
 #include "support/temp_folder.h"
 
 namespace tiny_prediction {

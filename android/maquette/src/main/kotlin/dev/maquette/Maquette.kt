@@ -254,15 +254,15 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
     fun predictor(config: Predictor.Config = Predictor.Config()): Predictor = predictor(config, null)
 
     /**
-     * Creates a predictor with the networks of [bundle]: [Predictor.Method.REFINED] or [Predictor.Method.SAMPLED]. Takes
-     * some 10 ms, so not on the main thread.
+     * Creates a predictor that samples with the networks of [bundle]: [Predictor.Method.SAMPLED]. Takes some 10 ms, so
+     * not on the main thread.
      *
      * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
      *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task, or without that network).
      */
     fun predictor(
         bundle: ModelBundle,
-        config: Predictor.Config = Predictor.Config(method = Predictor.Method.REFINED),
+        config: Predictor.Config = Predictor.Config(method = Predictor.Method.SAMPLED),
     ): Predictor = predictor(config, bundle)
 
     private fun predictor(config: Predictor.Config, bundle: ModelBundle?): Predictor =
@@ -270,24 +270,8 @@ class Maquette(logLevel: LogLevel = LogLevel.WARNING, onnxRuntime: String? = nul
             Predictor(Native.maq_predictor_create(context, config.native(bundle)))
         }
 
-    /**
-     * Creates a novelty stream with the networks of [bundle]. Takes some 10 ms, so not on the main thread.
-     *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] (a value out of its range), [Status.NOT_FOUND],
-     *   [Status.BAD_BUNDLE] and [Status.UNSUPPORTED] (a bundle of another task).
-     */
-    fun novelty(bundle: ModelBundle, config: Novelty.Config = Novelty.Config()): Novelty =
-        handle.use { context -> Novelty(context, bundle, config, null) }
-
-    /**
-     * Creates a further stream that shares the networks of [sharedWith], which may be closed. It takes a few kilobytes;
-     * both encode frames in turn. Does not block.
-     *
-     * @param eventRatio as in [Novelty.Config].
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] for a value out of its range.
-     */
-    fun novelty(sharedWith: Novelty, eventRatio: Float = 4f): Novelty =
-        handle.use { context -> Novelty(context, null, Novelty.Config(eventRatio = eventRatio), sharedWith) }
+    /** Creates the check of one stream's camera. Does not block. */
+    fun cameraHealth(): CameraHealth = handle.use { context -> CameraHealth(context) }
 
     /**
      * Creates a concealer of a live source. Until it is closed it takes the frames, and [Source.acquireFrame] fails with

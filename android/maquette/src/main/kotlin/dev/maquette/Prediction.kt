@@ -33,16 +33,13 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
         /** Moves everything on at the speed between the last two frames. */
         MOTION(MAQ_PREDICTOR_MOTION),
 
-        /** Refines [AUTO] by a network. Needs a bundle; not for a [Concealer]. */
-        REFINED(MAQ_PREDICTOR_REFINED),
-
         /** Samples one possible future by a transformer. Slow. Needs a bundle; not for a [Concealer]. */
         SAMPLED(MAQ_PREDICTOR_SAMPLED),
     }
 
     /**
      * @property threads 0: the large cores, at most 4; else 1 to 64.
-     * @property method [Method.REFINED] and [Method.SAMPLED] need a bundle.
+     * @property method [Method.SAMPLED] needs a bundle.
      * @property framePoolSize predicted frames that the app may hold at once, 1 to 64; 0: 4.
      * @property temperature of [Method.SAMPLED]: 0 takes the likeliest code; 1 samples by the probabilities.
      * @property seed of [Method.SAMPLED]: equal seeds give equal frames on one processor.
@@ -69,7 +66,7 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
      *
      * @property lumaMs of the push: the luma pyramid of the frame.
      * @property flowMs of the push: optical flow from the frame before.
-     * @property weightsMs of the push: blend weights ([Method.AUTO], [Method.REFINED], [Method.SAMPLED]).
+     * @property weightsMs of the push: blend weights ([Method.AUTO], [Method.SAMPLED]).
      * @property pushMs of the push: total without networks.
      * @property projectMs of the prediction: the flow projected to the later time.
      * @property warpMs of the prediction: pixels warped along the flow.
@@ -176,82 +173,72 @@ class Predictor internal constructor(pointer: Long) : AutoCloseable {
 }
 
 /**
- * Scores how unexpected each frame of a stream is after the frames before, and where, in bits. Finds cuts, frozen or
- * covered cameras, and objects that appear, without a list of events. Made by [Maquette.novelty].
+ * Tells whether the camera of a stream is all right: it freezes, turns black, is covered or knocked. Needs no networks.
+ * Made by [Maquette.cameraHealth].
  *
  * ```
- * val score = novelty.push(frame)
- * if (score.isEvent) show(score.ratio)
+ * val result = health.push(frame)
+ * if (result.event != CameraHealth.Event.OK) tell(result.event)
  * ```
  *
  * Functions may be called from any thread, one at a time, as of a [Predictor].
  */
-class Novelty internal constructor(
+class CameraHealth internal constructor(
     context: Long,
-    bundle: ModelBundle?,
-    config: Config,
-    sharedWith: Novelty?,
 ) : AutoCloseable {
-    private val handle: Handle
+    private val handle = Handle(this, Native.maq_camera_health_create(context), Native::maq_camera_health_destroy)
 
-    init {
-        fun create(other: Long): Long {
-            val native = config.native(bundle)
-            native.shared_with = other
-            return Native.maq_novelty_create(context, native)
-        }
-        val made = if (sharedWith == null) create(0) else sharedWith.handle.use(::create)
-        handle = Handle(this, made, Native::maq_novelty_destroy)
-    }
+    /** Events of a camera. */
+    enum class Event(internal val code: Int) {
+        /** Nothing. */
+        OK(MAQ_CAMERA_OK),
 
-    /** The source of code probabilities. */
-    enum class Method(internal val code: Int) {
-        /** The bundle's transformer, which sees three past frames; without one, the bigram prior. */
-        AUTO(MAQ_NOVELTY_AUTO),
+        /** Another scene: the frames after it are not like those before. */
+        CUT(MAQ_CAMERA_CUT),
 
-        /** The bigram prior: how often a code followed another in training. Takes about 0 ms. */
-        BIGRAM(MAQ_NOVELTY_BIGRAM),
-    }
+        /** Frames are equal, byte for byte, for 0.3 s. */
+        FREEZE(MAQ_CAMERA_FREEZE),
 
-    /**
-     * @property threads as in [DensePose.Config].
-     * @property eventRatio a frame is an event from this ratio up, and from 1 / eventRatio down; above 1, at most 1e6;
-     *   0: 4.
-     */
-    data class Config(
-        val threads: Int = 0,
-        val eventRatio: Float = 4f,
-        val method: Method = Method.AUTO,
-    ) {
-        internal fun native(bundle: ModelBundle?) =
-            maq_novelty_config().also {
-                it.model.set(bundle, threads)
-                it.event_ratio = eventRatio
-                it.method = method.code
-            }
+        /** The whole picture is black. */
+        BLACK(MAQ_CAMERA_BLACK),
+
+        /** A large part of the picture lost its detail at once, as by a hand, cloth or spray. */
+        COVERED(MAQ_CAMERA_COVERED),
+
+        /** The camera was knocked or turned: the picture jumped and then rests. */
+        MOVED(MAQ_CAMERA_MOVED),
+
+        /** Something is there at once that did not move into the picture. */
+        OBJECT(MAQ_CAMERA_OBJECT),
+        ;
+
+        /** The event in one word, as the command line prints it. */
+        val word: String get() = textAt(Native.maq_camera_event_get_name(code))
     }
 
     /**
-     * The score of one frame.
+     * The result for one frame.
      *
-     * @property bits mean of all codes: about 0.03 when nothing changes, 1 to 3 when much moves, above 8 for a frame that
-     *   nothing predicted.
-     * @property ratio bits divided by the median of the 8 frames before: 1 is usual; 1/6 is a stream that freezes. 1
-     *   while fewer than 4 frames are known.
-     * @property isEvent a cut, or the ratio reached [Config.eventRatio] or 1 / that.
-     * @property isCut scene cut: the previous frame does not make this one more likely.
+     * @property event found with this frame. CUT, COVERED, MOVED and OBJECT are found when the picture rests again: a cut
+     *   mostly one frame after it began, the others five, at most 31.
+     * @property state what lasts: [Event.FREEZE], [Event.BLACK] or [Event.COVERED], or [Event.OK].
+     * @property beganNs of an event: the timestamp of its first frame.
+     * @property xPx of an object: its middle. Of a move: how far the picture moved to the right. Otherwise 0.
+     * @property yPx the same, from the top, and downward.
+     * @property unexplained fraction of the frame that no motion from the frame before explains: 0 to 1.
      * @property isStreamStart the frame continues no stream: the first one, another size, format or clock, an earlier
-     *   time, or more than a second later. The bits then count how rare its codes are.
+     *   time, or more than a second later.
      * @property columns of the map.
      * @property rows of the map.
-     * @property map mean bits of a code per cell, [rows] rows of [columns] values from the top left. The cells divide a
-     *   frame of any shape evenly.
+     * @property map how far motion leaves each cell unexplained, 0 to 1, [rows] rows of [columns] values from the top left.
      */
-    class Score internal constructor(
-        val bits: Float,
-        val ratio: Float,
-        val isEvent: Boolean,
-        val isCut: Boolean,
+    class Result internal constructor(
+        val event: Event,
+        val state: Event,
+        val beganNs: Long,
+        val xPx: Float,
+        val yPx: Float,
+        val unexplained: Float,
         val isStreamStart: Boolean,
         val columns: Int,
         val rows: Int,
@@ -259,69 +246,45 @@ class Novelty internal constructor(
     )
 
     /**
-     * Wall-clock milliseconds of the latest frame, and counts since the stream was created.
-     *
-     * @property resizeMs the frame resized to the encoder's input.
-     * @property networkMs the encoder.
-     * @property nearestMs the nearest codebook entries of its features.
-     * @property transformerMs the transformer; 0 with the bigram prior.
-     * @property pushMs total.
-     * @property threads of the networks.
+     * Wall-clock milliseconds of the latest frame, and counts since creation.
      */
     data class Stats(
-        val resizeMs: Double,
-        val networkMs: Double,
-        val nearestMs: Double,
-        val transformerMs: Double,
         val pushMs: Double,
-        val threads: Int,
         val pushedCount: Long,
         val eventCount: Long,
         val streamStartCount: Long,
     )
 
     /**
-     * Scores the stream's next frame, of any size and format except depth. The frame is not kept. Takes milliseconds, so
-     * not on the main thread. An error leaves the stream as it was before the frame.
+     * Checks the stream's next frame, of any size and format except depth. The frame is not kept. Takes about a
+     * millisecond. An error leaves the stream as it was before the frame.
      *
-     * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image) and [Status.INFERENCE].
+     * @throws MaquetteException with [Status.UNSUPPORTED] (a depth image).
      */
-    fun push(frame: Frame): Score =
-        handle.use { novelty ->
-            val s = maq_novelty_score()
-            frame.handle.use { Native.maq_novelty_push(novelty, it, s) }
-            val cells = s.columns * s.rows
-            val map = Memory(4 * cells).also { Native.maq_novelty_copy_map(novelty, it, cells.toLong()) }
-            Score(
-                s.bits, s.ratio, s.is_event != 0, s.is_cut != 0, s.is_stream_start != 0, s.columns, s.rows,
-                map.floats(0, cells).toFloatArray(),
+    fun push(frame: Frame): Result =
+        handle.use { health ->
+            val r = maq_camera_health_result()
+            frame.handle.use { Native.maq_camera_health_push(health, it, r) }
+            val cells = r.columns * r.rows
+            val map = Memory(4 * maxOf(cells, 1))
+            Native.maq_camera_health_copy_map(health, map, cells.toLong())
+            fun eventOf(code: Int) = Event.entries.first { it.code == code }
+            Result(
+                eventOf(r.event), eventOf(r.state), r.began_ns, r.x_px, r.y_px, r.unexplained, r.is_stream_start != 0,
+                r.columns, r.rows, map.floats(0, cells).toFloatArray(),
             )
         }
 
-    /**
-     * Decodes the codes of the latest frame to a small square RGB image: the detail that the network kept. The time is
-     * the frame's; [Frame.origin] has a horizon of 0. It comes from a pool of 4: close it soon. The first call takes
-     * longer.
-     *
-     * @throws MaquetteException with [Status.INVALID_ARGUMENT] before the first frame, [Status.POOL_EMPTY],
-     *   [Status.BAD_BUNDLE] and [Status.INFERENCE].
-     */
-    fun reconstruction(): Frame = Frame(handle.use(Native::maq_novelty_acquire_reconstruction))
-
     /** Forgets the frames so far, to begin another stream. */
-    fun reset() = handle.use(Native::maq_novelty_reset)
+    fun reset() = handle.use(Native::maq_camera_health_reset)
 
     /** Times and counts at this moment. */
     val stats: Stats
         get() {
-            val s = handle.read(maq_novelty_stats(), Native::maq_novelty_get_stats)
-            return Stats(
-                s.resize_ms, s.network_ms, s.nearest_ms, s.transformer_ms, s.push_ms, s.threads, s.pushed_count,
-                s.event_count, s.stream_start_count,
-            )
+            val s = handle.read(maq_camera_health_stats(), Native::maq_camera_health_get_stats)
+            return Stats(s.push_ms.toDouble(), s.pushed_count, s.event_count, s.stream_start_count)
         }
 
-    /** Its images, and streams that share its networks, stay valid. */
     override fun close() = handle.close()
 }
 

@@ -104,22 +104,6 @@ class PredictorTest : AndroidTest() {
         }
 
     @Test
-    fun aNetworkRefinesThePrediction() {
-        val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
-        maquette.predictor(networks).use { predictor ->
-            predictor.pushTexture(0..2)
-            predictor.predict(0.2).use {
-                assertEquals(200_000_000L, it.origin!!.horizonNs)
-                assertTrue(error(it, 16) < 6) // far from what stands still
-            }
-            assertTrue(predictor.stats.networksMs > 0)
-            assertEquals(0, predictor.stats.sampledFrameCount)
-            assertEquals(Predictor.Method.REFINED, predictor.stats.method)
-            failure(Status.UNSUPPORTED) { predictor.sample(1, 1, 0.1) }
-        }
-    }
-
-    @Test
     fun samplesDependOnTheSeedAloneAndHaveAnEntropyMap() {
         val networks = ModelBundle.ofFolder(TestFiles.predictionBundle.path)
         val sampling = Predictor.Config(threads = 1, method = Predictor.Method.SAMPLED, temperature = 1f, seed = -2)

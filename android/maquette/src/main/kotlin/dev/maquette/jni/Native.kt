@@ -27,6 +27,13 @@ internal object Native {
     @JvmStatic external fun maq_body_result_get_sizes(result: Long, index: Int, sizes: Memory?)
     @JvmStatic external fun maq_body_result_release(result: Long)
     @JvmStatic external fun maq_body_run(body: Long, input: Memory?): Long
+    @JvmStatic external fun maq_camera_event_get_name(event: Int): Long
+    @JvmStatic external fun maq_camera_health_copy_map(health: Long, values: Memory?, capacity: Long)
+    @JvmStatic external fun maq_camera_health_create(context: Long): Long
+    @JvmStatic external fun maq_camera_health_destroy(health: Long)
+    @JvmStatic external fun maq_camera_health_get_stats(health: Long, stats: Memory?)
+    @JvmStatic external fun maq_camera_health_push(health: Long, frame: Long, result: Memory?)
+    @JvmStatic external fun maq_camera_health_reset(health: Long)
     @JvmStatic external fun maq_camera_list_create(context: Long): Long
     @JvmStatic external fun maq_camera_list_destroy(list: Long)
     @JvmStatic external fun maq_camera_list_get_camera(list: Long, index: Int, info: Memory?)
@@ -155,13 +162,6 @@ internal object Native {
     @JvmStatic external fun maq_image_release(image: Long)
     @JvmStatic external fun maq_image_save(image: Long, path: Memory?, alpha: Int)
     @JvmStatic external fun maq_model_destroy(model: Long)
-    @JvmStatic external fun maq_novelty_acquire_reconstruction(novelty: Long): Long
-    @JvmStatic external fun maq_novelty_copy_map(novelty: Long, bits: Memory?, capacity: Long)
-    @JvmStatic external fun maq_novelty_create(context: Long, config: Memory?): Long
-    @JvmStatic external fun maq_novelty_destroy(novelty: Long)
-    @JvmStatic external fun maq_novelty_get_stats(novelty: Long, stats: Memory?)
-    @JvmStatic external fun maq_novelty_push(novelty: Long, frame: Long, score: Memory?)
-    @JvmStatic external fun maq_novelty_reset(novelty: Long)
     @JvmStatic external fun maq_pipeline_acquire_result(pipeline: Long, timeout_ns: Long): Long
     @JvmStatic external fun maq_pipeline_create(context: Long, config: Memory?): Long
     @JvmStatic external fun maq_pipeline_destroy(pipeline: Long)
@@ -229,6 +229,9 @@ internal const val MAQ_BODY_ANGLE_LEFT_HIP = 4; internal const val MAQ_BODY_ANGL
 internal const val MAQ_BODY_ANGLE_LEFT_SHOULDER = 6; internal const val MAQ_BODY_ANGLE_RIGHT_SHOULDER = 7
 internal const val MAQ_BODY_FIT_FITTED = 0; internal const val MAQ_BODY_FIT_TOO_FEW_PIXELS = 1
 internal const val MAQ_BODY_FIT_UNRELIABLE = 2
+internal const val MAQ_CAMERA_OK = 0; internal const val MAQ_CAMERA_CUT = 1; internal const val MAQ_CAMERA_FREEZE = 2
+internal const val MAQ_CAMERA_BLACK = 3; internal const val MAQ_CAMERA_COVERED = 4
+internal const val MAQ_CAMERA_MOVED = 5; internal const val MAQ_CAMERA_OBJECT = 6
 internal const val MAQ_CLOCK_MEDIA = 1; internal const val MAQ_CLOCK_MONOTONIC = 2
 internal const val MAQ_DENSEPOSE_CROPS_DEFAULT = 0; internal const val MAQ_DENSEPOSE_CROPS_AUTO = 1
 internal const val MAQ_DENSEPOSE_CROPS_ALL = 2; internal const val MAQ_DENSEPOSE_CROPS_OFF = 3
@@ -260,7 +263,6 @@ internal const val MAQ_IMAGE_PLANE_DEPTH = 3; internal const val MAQ_IMAGE_PLANE
 internal const val MAQ_IMAGE_PLANE_TEMPLATE_POINTS = 5
 internal const val MAQ_LOG_OFF = -1; internal const val MAQ_LOG_ERROR = 1; internal const val MAQ_LOG_WARNING = 2
 internal const val MAQ_LOG_INFO = 3; internal const val MAQ_LOG_DEBUG = 4
-internal const val MAQ_NOVELTY_AUTO = 0; internal const val MAQ_NOVELTY_BIGRAM = 1
 internal const val MAQ_PIPELINE_STOPPED = 0; internal const val MAQ_PIPELINE_OPENING = 1
 internal const val MAQ_PIPELINE_LOADING = 2; internal const val MAQ_PIPELINE_RUNNING = 3
 internal const val MAQ_PIPELINE_PAUSED = 4; internal const val MAQ_PIPELINE_STALLED = 5
@@ -270,8 +272,7 @@ internal const val MAQ_PIXEL_RGB8 = 1; internal const val MAQ_PIXEL_BGR8 = 2; in
 internal const val MAQ_PIXEL_GREY8 = 4; internal const val MAQ_PIXEL_NV12 = 5; internal const val MAQ_PIXEL_YUYV = 6
 internal const val MAQ_PIXEL_DEPTH16 = 7; internal const val MAQ_PIXEL_DEPTH32F = 8
 internal const val MAQ_PREDICTOR_AUTO = 0; internal const val MAQ_PREDICTOR_LAST = 1
-internal const val MAQ_PREDICTOR_MOTION = 2; internal const val MAQ_PREDICTOR_REFINED = 3
-internal const val MAQ_PREDICTOR_SAMPLED = 4
+internal const val MAQ_PREDICTOR_MOTION = 2; internal const val MAQ_PREDICTOR_SAMPLED = 3
 internal const val MAQ_PROVIDER_CPU = 0; internal const val MAQ_PROVIDER_XNNPACK = 1
 internal const val MAQ_PROVIDER_NNAPI = 2
 internal const val MAQ_SOURCE_CONTROL_AUTO_EXPOSURE = 1; internal const val MAQ_SOURCE_CONTROL_EXPOSURE = 2
@@ -339,6 +340,17 @@ internal class maq_body_size(outer: Memory? = null, at: Int = 0) : Memory(12, ou
 internal class maq_body_sizes(outer: Memory? = null, at: Int = 0) : Struct(68, outer, at) {
     val is_height_known get() = int(4); val height = maq_body_size(this, 8); val chest = maq_body_size(this, 20)
     val waist = maq_body_size(this, 32); val hip = maq_body_size(this, 44); val inseam = maq_body_size(this, 56)
+}
+
+internal class maq_camera_health_result(outer: Memory? = null, at: Int = 0) : Struct(48, outer, at) {
+    val event get() = int(4); val state get() = int(8); val began_ns get() = long(16); val x_px get() = float(24)
+    val y_px get() = float(28); val unexplained get() = float(32); val columns get() = int(36)
+    val rows get() = int(40); val is_stream_start get() = int(44)
+}
+
+internal class maq_camera_health_stats(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
+    val push_ms get() = float(4).toDouble(); val pushed_count get() = long(8); val event_count get() = long(16)
+    val stream_start_count get() = long(24)
 }
 
 internal class maq_camera_info(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
@@ -575,24 +587,6 @@ internal class maq_memory_file(outer: Memory? = null, at: Int = 0) : Memory(24, 
     var size_bytes: Long get() = long(16); set(v) = long(16, v)
 }
 
-internal class maq_novelty_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
-    var event_ratio: Float get() = float(44); set(v) = float(44, v)
-    var shared_with: Long get() = long(48); set(v) = long(48, v)
-}
-
-internal class maq_novelty_score(outer: Memory? = null, at: Int = 0) : Struct(32, outer, at) {
-    val columns get() = int(4); val rows get() = int(8); val bits get() = float(12); val ratio get() = float(16)
-    val is_event get() = int(20); val is_cut get() = int(24); val is_stream_start get() = int(28)
-}
-
-internal class maq_novelty_stats(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
-    val resize_ms get() = float(4).toDouble(); val network_ms get() = float(8).toDouble()
-    val nearest_ms get() = float(12).toDouble(); val transformer_ms get() = float(16).toDouble()
-    val push_ms get() = float(20).toDouble(); val threads get() = int(24); val pushed_count get() = long(32)
-    val event_count get() = long(40); val stream_start_count get() = long(48)
-}
-
 internal class maq_pipeline_config(outer: Memory? = null, at: Int = 0) : Struct(56, outer, at) {
     var result_pool_size: Int get() = int(4); set(v) = int(4, v); val source get() = Pointer(this, 8)
     var state_callback: Long get() = long(32); set(v) = long(32, v)
@@ -630,7 +624,7 @@ internal class maq_predictor_config(outer: Memory? = null, at: Int = 0) : Struct
     val model = maq_model_options(this, 8); var method: Int get() = int(40); set(v) = int(40, v)
     var frame_pool_size: Int get() = int(44); set(v) = int(44, v)
     var temperature: Float get() = float(48); set(v) = float(48, v)
-    var seed: Long get() = long(56); set(v) = long(56, v); var shared_with: Long get() = long(64); set(v) = long(64, v)
+    var seed: Long get() = long(56); set(v) = long(56, v)
 }
 
 internal class maq_predictor_stats(outer: Memory? = null, at: Int = 0) : Struct(88, outer, at) {

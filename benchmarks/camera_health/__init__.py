@@ -1,0 +1,1 @@
+"""Measures camera health on real films into which events are put."""

@@ -39,7 +39,7 @@ uint64_t checksum_of(const ImageView& image) {
   return sum;
 }
 
-Brightness brightness_of(const LumaLevel& level) {
+PictureBrightness brightness_of(const LumaLevel& level) {
   float brightest = 0, sum = 0, squares = 0;
   for (int y = 0; y < level.height_px; ++y) {
     const float* const row = level.at(0, y);

@@ -197,7 +197,8 @@ void HealthRules::follow_disturbance(const SmallPicture& picture, const PictureM
   }
 }
 
-bool HealthRules::find_outage(bool is_equal, const Brightness& brightness, int64_t time_ns, HealthResult& result) {
+bool HealthRules::find_outage(bool is_equal, const PictureBrightness& brightness, int64_t time_ns,
+                              HealthResult& result) {
   equal_frames_ = is_equal && has_frame_ ? equal_frames_ + 1 : 0;
   if (equal_frames_ == 0) equal_since_ns_ = time_ns;
   const bool is_black = brightness.brightest < kBlackBrightest && brightness.deviation < kBlackDeviation;
@@ -221,7 +222,7 @@ bool HealthRules::find_outage(bool is_equal, const Brightness& brightness, int64
 }
 
 HealthResult HealthRules::add(const SmallPicture& picture, const SmallPicture& before, const PictureMatch& match,
-                              bool is_equal, const Brightness& brightness, int64_t time_ns) {
+                              bool is_equal, const PictureBrightness& brightness, int64_t time_ns) {
   HealthResult result;
   result.is_stream_start = !has_frame_;
   result.unexplained = match.unexplained_fraction();

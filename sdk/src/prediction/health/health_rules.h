@@ -23,7 +23,7 @@ struct HealthResult {
 };
 
 // The brightness of a picture, in grey levels.
-struct Brightness {
+struct PictureBrightness {
   float brightest = 0, deviation = 0;
 };
 
@@ -37,7 +37,7 @@ class HealthRules {
   // Judges the stream's next frame by its picture and the picture before. `match`: one in the other. `is_equal`: every
   // byte is as in the frame before. Pictures are kept where they are needed later.
   HealthResult add(const SmallPicture& picture, const SmallPicture& before, const PictureMatch& match, bool is_equal,
-                   const Brightness& brightness, int64_t time_ns);
+                   const PictureBrightness& brightness, int64_t time_ns);
 
  private:
   static constexpr size_t kBefore = 8;  // frames that say what is usual
@@ -48,7 +48,7 @@ class HealthRules {
   void remember(const PictureMatch& match);
   void forget_usual();
   // Returns whether the picture is black or equal ones came, and then fills the result.
-  bool find_outage(bool is_equal, const Brightness& brightness, int64_t time_ns, HealthResult& result);
+  bool find_outage(bool is_equal, const PictureBrightness& brightness, int64_t time_ns, HealthResult& result);
   void begin_disturbance(const SmallPicture& before, const PictureMatch& match, int64_t time_ns);
   bool is_much_worse(const PictureMatch& match) const;
   bool is_cut(const PictureMatch& match);

@@ -23,14 +23,14 @@ constexpr double kUsualLuma = 150, kDarkestPaint = 0.4, kBrightestPaint = 1.1;
 // So many of the visible texels of an eyeball are darker than its white.
 constexpr double kDarkerThanWhite = 0.85;
 
-using Rgb = std::array<double, 3>;
+using PaintColour = std::array<double, 3>;
 
 bool is_eyeball(TemplateKind kind) { return kind == TemplateKind::kEye || kind == TemplateKind::kEyeFront; }
 bool is_painted(TemplateKind kind) {
   return kind == TemplateKind::kMouth || kind == TemplateKind::kTeeth || kind == TemplateKind::kTongue;
 }
 
-double brightness(const Rgb& rgb) { return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2]; }
+double brightness(const PaintColour& rgb) { return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2]; }
 
 class TemplateTexture {
  public:
@@ -98,7 +98,7 @@ class TemplateTexture {
     return reach_[at(place[1]) * kReachSide + at(place[0])] - float(length(point - kLayoutCentre));
   }
 
-  Rgb seen_at(Vec3 point) const {
+  PaintColour seen_at(Vec3 point) const {
     const auto place = texture_place(point);
     const auto bgr =
         between_pixels<uint8_t, 3>(from_.bgr, from_.side_px, from_.side_px, double(place[0]) * from_.side_px - 0.5,
@@ -117,7 +117,7 @@ class TemplateTexture {
   }
 
   void colour(size_t texel, const uint32_t* corners, const double* shares) {
-    Rgb painted{};
+    PaintColour painted{};
     double share = 0;
     for (size_t k = 0; k < 3; ++k) {
       if (!is_painted(kind_of(corners[k]))) continue;
@@ -127,7 +127,7 @@ class TemplateTexture {
     const bool is_eye = is_eyeball(kind_of(corners[0]));
     const float covered = covered_by(between(onto_.points, corners, shares));
     const double seen = covered > (is_eye ? kEyeCovered_dm : kSkinCovered_dm) ? 0 : 1 - share;
-    const Rgb rgb = seen_at(between(points_, corners, shares));
+    const PaintColour rgb = seen_at(between(points_, corners, shares));
     const double weight = seen + share;
     weights_[texel] = is_eye && seen == 0 ? kIsWhite : float(weight);
     for (size_t c = 0; c < 3; ++c) {
@@ -145,7 +145,7 @@ class TemplateTexture {
       visible.push_back({brightness({double(rgb[0]), double(rgb[1]), double(rgb[2])}), i});
     }
     std::sort(visible.begin(), visible.end());
-    Rgb white = {225 * paint_, 222 * paint_, 218 * paint_};
+    PaintColour white = {225 * paint_, 222 * paint_, 218 * paint_};
     if (const size_t first = size_t(kDarkerThanWhite * double(visible.size())); first < visible.size()) {
       white = {};
       for (size_t k = first; k < visible.size(); ++k) {

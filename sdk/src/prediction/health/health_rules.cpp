@@ -26,11 +26,11 @@ constexpr size_t kMinBefore = 4;  // frames: before, nothing is known to be usua
 constexpr int kRestFrames = 4, kMaxDisturbedFrames = 30;
 
 // Limits for the change from before a disturbance to after it.
-constexpr float kCutFraction = 0.42f;  // unexplained in the first frame of another scene
-constexpr float kWholePicture = 0.8f;  // no hand covers so much in one frame
-constexpr float kAroundCut = 0.5f;     // as a part of it, unexplained in the frames before and after
+constexpr float kSceneFraction = 0.42f;  // unexplained in the first frame of another scene
+constexpr float kWholePicture = 0.8f;    // no hand covers so much in one frame
+constexpr float kAroundCut = 0.5f;       // as a part of it, unexplained in the frames before and after
 constexpr float kAbruptRatio = 0.6f, kMuchWorse = 2;
-constexpr float kMovedShift = 0.06f, kMovedFraction = 0.33f;
+constexpr float kMovedShift = 0.06f, kKnockFraction = 0.33f;
 constexpr float kObjectFraction = 0.02f, kMinNewOfObject = 0.035f, kStillFraction = 0.4f;
 
 // The motion of the whole picture, in fractions of its width; 0 where it has none in common.
@@ -67,7 +67,7 @@ float HealthRules::new_fraction(const PictureMatch& match) const {
 }
 
 bool HealthRules::is_disturbed(const PictureMatch& match) const {
-  if (known_ < kMinBefore) return match.unexplained_fraction() >= kCutFraction;
+  if (known_ < kMinBefore) return match.unexplained_fraction() >= kSceneFraction;
   if (new_fraction(match) >= kNewFraction) return true;
   const float usual = *std::max_element(shifts_.begin(), shifts_.begin() + ptrdiff_t(known_));
   return shift_of(match) >= std::max(kJump, kJumpRatio * usual);
@@ -133,7 +133,7 @@ void HealthRules::name_event(const SmallPicture& picture, const PictureMatch& ma
     return;
   }
   const float shift = std::hypot(change_.shift_x(), change_.shift_y());
-  if (change_.shift_fraction() >= kMovedFraction && shift >= kMovedShift) {
+  if (change_.shift_fraction() >= kKnockFraction && shift >= kMovedShift) {
     result.event = CameraEvent::kMoved;
     result.shift_x = change_.shift_x();
     result.shift_y = change_.shift_y();
@@ -165,9 +165,9 @@ bool HealthRules::is_much_worse(const PictureMatch& match) const {
 // One frame does not follow from the one before, but the frames before it do, and the frames after it. change_ was
 // found.
 bool HealthRules::is_cut(const PictureMatch& match) {
-  return disturbed_frames_ == 2 && peak_fraction_ >= kCutFraction &&
+  return disturbed_frames_ == 2 && peak_fraction_ >= kSceneFraction &&
          std::max(fraction_before_, match.unexplained_fraction()) <= kAroundCut * peak_fraction_ &&
-         change_.unexplained_fraction() >= kCutFraction && change_.shift_fraction() < kMovedFraction &&
+         change_.unexplained_fraction() >= kSceneFraction && change_.shift_fraction() < kKnockFraction &&
          (peak_fraction_ >= kWholePicture || !is_covered(change_));
 }
 

@@ -336,7 +336,7 @@ TEST_F(CommandLine, TheDoctorReadsTheNetworksOfEachSystemAndTellsTheirPrecisionA
   const Outcome result = run("doctor");
   for (const char* text : {"ok    densepose: fp32, 0.", "tiny_bundle\n", "ok    scenes: ", "tiny_scene/bundle\n",
                            "ok    edges: int8, 1.4 MB  ", "/models/edges-int8\n", "ok    heads: int8, 4.0 MB  ",
-                           "ok    prediction: int8, 7.7 MB  "}) {
+                           "ok    prediction: int8, 6.0 MB  "}) {
     EXPECT_NE(result.out.find(text), std::string::npos) << text << result.out;
   }
 }

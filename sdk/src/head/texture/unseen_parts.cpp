@@ -108,8 +108,9 @@ void add_class(const Differences& known, const Texels& texels, Share&& share, Ev
 
 // Degrees within the hairline, of each texel's direction; negative outside.
 double within_hairline(size_t texel, int side) {
-  const double right = (double(texel % size_t(side)) + 0.5) / side - 0.5;
-  const double up = 0.5 - (double(texel / size_t(side)) + 0.5) / side;  // the back of the head is above
+  const size_t column = texel % size_t(side), row = texel / size_t(side);
+  const double right = (double(column) + 0.5) / side - 0.5;
+  const double up = 0.5 - (double(row) + 0.5) / side;  // the back of the head is above
   const double angle = texture_angle(std::hypot(right, up)) * kDegreesOfRadian, around = std::atan2(right, -up);
   return kHairlineMean - kHairlineTurn * std::cos(around) + kHairlineFold * std::cos(2 * around) - angle;
 }

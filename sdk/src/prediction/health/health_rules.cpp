@@ -115,8 +115,9 @@ bool HealthRules::find_object(const PictureMatch& since_rest, HealthResult& resu
   float x = 0, y = 0, count = 0, still = 0;
   for (size_t i = 0; i < change_.unexplained().size(); ++i) {
     if (change_.unexplained()[i] <= kUnexplained) continue;
-    x += float(int(i) % change_.columns());
-    y += float(int(i) / change_.columns());
+    const int column = int(i) % change_.columns(), row = int(i) / change_.columns();
+    x += float(column);
+    y += float(row);
     count += 1;
     still += since_rest.unexplained()[i] <= kUnexplained && since_rest.is_at_rest(i) ? 1.0f : 0.0f;
   }

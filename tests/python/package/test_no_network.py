@@ -40,6 +40,7 @@ COMMANDS = {
     "head info": ["{}/head.maqh"],
     "body": [f"image:{MEDIA}/photo.jpg?size=256x256", "--out", "{}/body.glb"],
     "head render": ["{}/head.maqh", "--cell", "8", "--size", "80x60", "--out", "{}/head.png"],
+    "head export": ["{}/head.maqh", "--triangles", "500", "--out", "{}/exported.obj"],
     "scene make": ["film.mp4", "--out", "{}/made.maqs"],
     "scene build": [f"{MEDIA}/room", "--points", "2000", "--views", "2", "--long-side", "160", "--out", "{}/room.maqs"],
     "scene render": ["{}/room.maqs", "--path", "orbit", "--size", "80x60", "--seconds", "0.1", "--out", "{}/room.mp4"],

@@ -297,7 +297,7 @@ typedef struct maq_head_mesh_data {
  * deltas of several actions add up. Texts and arrays are the mesh's. */
 typedef struct maq_head_morph_target {
   uint32_t struct_size;
-  uint32_t vertex_count; /* vertices that move; all others stay */
+  uint32_t vertex_count; /* vertices that move; all others stay. 0 of viseme_sil, silence: then there are no arrays */
   const char* name; /* one of ARKit's 52 actions, such as jawOpen or eyeBlinkLeft; left is the person's left. Or one of
                        15 visemes for speech, such as viseme_aa. */
   const uint32_t* vertices; /* [vertex_count], increasing */

@@ -96,8 +96,7 @@ class HeadMesh internal constructor(pointer: Long) : AutoCloseable {
 
     private fun morphTargetOf(mesh: Long, index: Int): MorphTarget {
         val target = maq_head_morph_target().also { Native.maq_head_mesh_get_morph_target(mesh, index, it) }
-        val vertices = IntArray(target.vertex_count)
-        target.vertices.bytes(4L * vertices.size).asIntBuffer().get(vertices)
+        val vertices = target.vertices.ints(target.vertex_count)
         return MorphTarget(target.name.text(), vertices, target.deltas_m.floats(3 * vertices.size))
     }
 

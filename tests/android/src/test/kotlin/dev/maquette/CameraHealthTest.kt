@@ -43,7 +43,7 @@ class CameraHealthTest : AndroidTest() {
 
     @Test
     fun framesOfAnySizeAreTakenAndDepthIsRefused() =
-        maquette.cameraHealth().use { health ->
+        maquette.cameraHealth().use<CameraHealth, Unit> { health ->
             val flat = ByteBuffer.allocateDirect(3000)
             for ((width, height) in listOf(1 to 1, 3000 to 1, 1 to 3000)) {
                 maquette.frame(PixelFormat.GREY8, width, height, Plane(flat)).use { frame ->

@@ -385,7 +385,7 @@ class HeadTest : AndroidTest() {
                     assertEquals(0f, depth[0])
                     assertTrue("${depth[middle]}", depth[middle] in 0.2f..2f)
                     assertTrue("towards the camera", normals[3 * middle + 2] < -0.8f)
-                    assertTrue("the front of the template head", points[3 * middle + 1] < -0.05f)
+                    assertTrue("the front of the template head", points[3 * middle + 2] > 0.05f)
                     val opaque = image.toBitmap()
                     val cut = image.toBitmap(withAlpha = true)
                     assertEquals(0xFF shl 24, opaque.getPixel(0, 0))

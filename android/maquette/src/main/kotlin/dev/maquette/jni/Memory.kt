@@ -109,11 +109,12 @@ internal class Pointer(private val of: Memory, private val at: Int = 0) {
 
     fun bytes(sizeBytes: Long): ByteBuffer = bytesOrNull(sizeBytes)!!
 
-    fun floats(count: Int) = FloatArray(count).also { bytes(4L * count).asFloatBuffer().get(it) }
+    // No numbers may lie nowhere.
+    fun floats(count: Int) = FloatArray(count).also { if (count > 0) bytes(4L * count).asFloatBuffer().get(it) }
 
-    fun ints(count: Int) = IntArray(count).also { bytes(4L * count).asIntBuffer().get(it) }
+    fun ints(count: Int) = IntArray(count).also { if (count > 0) bytes(4L * count).asIntBuffer().get(it) }
 
-    fun doubles(count: Int) = DoubleArray(count).also { bytes(8L * count).asDoubleBuffer().get(it) }
+    fun doubles(count: Int) = DoubleArray(count).also { if (count > 0) bytes(8L * count).asDoubleBuffer().get(it) }
 }
 
 /** Two numbers that [fill] writes. */

@@ -57,7 +57,6 @@ class Call {
 
 // Runs `body`, which returns a status or throws. Nothing gets past this.
 maq_status run_guarded(const Handle* handle, const char* function, const Call& body) noexcept;
-
 template <class Body>
 maq_status guarded(const Handle* handle, const char* function, Body&& body) noexcept {
   return run_guarded(handle, function, Call(body));

@@ -42,8 +42,7 @@ head::TextureOptions texture_options(const maq_head_builder_config& config) {
   if (config.texture_px != 0 || options.delight) {
     throw ArgumentError(
         "config.texture_px or delight_texture is set, but config.texture is MAQ_HEAD_TEXTURE_OFF; leave them 0, or "
-        "allow "
-        "a texture.");
+        "allow a texture.");
   }
   options.side_px = 0;
   return options;

@@ -8,7 +8,7 @@
 namespace maq {
 namespace {
 
-// A checksum of bytes: a chain of multiplications, which no two frames of a camera fraction by chance.
+// A checksum of bytes: a chain of multiplications, which no two frames of a camera share by chance.
 uint64_t checksum_of(uint64_t sum, const uint8_t* bytes, size_t count) {
   constexpr uint64_t kFactor = 0x9E3779B97F4A7C15u;
   const auto add = [&](uint64_t word) {

@@ -8,8 +8,11 @@ import { converted, root } from './native.js';
 const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 
 // Serves a folder on this machine; `close` ends it. Files whose names match `damaged` have other bytes, those that match
-// `missing` are not there.
-export async function serve(folder, { damaged = /^$/, missing = /^$/ } = {}) {
+// `missing` are not there. A page is `isolated` from other origins where threads are wanted.
+export async function serve(folder, { damaged = /^$/, missing = /^$/, isolated = true } = {}) {
+  const isolation = isolated
+    ? { 'cross-origin-opener-policy': 'same-origin', 'cross-origin-embedder-policy': 'require-corp' }
+    : {};
   const server = createServer((request, response) => {
     const path = normalize(new URL(request.url, 'http://localhost').pathname);
     const file = join(folder, path.endsWith('/') ? `${path}index.html` : path);
@@ -17,7 +20,7 @@ export async function serve(folder, { damaged = /^$/, missing = /^$/ } = {}) {
       response.writeHead(404).end();
       return;
     }
-    response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
+    response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream', ...isolation });
     if (damaged.test(file)) response.end('damaged');
     else createReadStream(file).pipe(response);
   });

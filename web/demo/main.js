@@ -5,7 +5,7 @@ import { Measurements } from './measurements.js';
 
 const element = (id) => document.getElementById(id);
 const canvas = element('view');
-const context = canvas.getContext('2d');
+const context = canvas.getContext('2d', { willReadFrequently: true });
 const video = element('video');
 const started = performance.now();
 
@@ -63,28 +63,73 @@ async function showPhoto(image) {
   say('');
 }
 
-// Frames of the video, the newest one each time, until another source is shown.
+// The newest frame of the video, from the time it is there until it is taken.
+function watchVideo(isOver) {
+  let newest = null;
+  let arrived = () => {};
+  (async () => {
+    while (!isOver()) {
+      await new Promise((resolve) => video.requestVideoFrameCallback(resolve));
+      if (isOver()) break;
+      newest?.close();
+      newest = await createImageBitmap(video);
+      arrived();
+    }
+    newest?.close();
+    newest = null;
+    arrived();
+  })();
+  const take = () => {
+    const frame = newest;
+    newest = null;
+    return frame;
+  };
+  return {
+    take,
+    // Waits for one; null when it is over.
+    async next() {
+      if (newest === null && !isOver()) await new Promise((resolve) => (arrived = resolve));
+      return take();
+    },
+  };
+}
+
+// Frames of the video until another source is shown. What was found is drawn while the worker has the next frame.
 async function showVideo() {
   const mine = ++run;
   photo = null;
+  const frames = watchVideo(() => mine !== run);
   let isFirst = true;
-  while (mine === run) {
-    await new Promise((resolve) => video.requestVideoFrameCallback(resolve));
-    if (mine !== run) return;
-    const frame = await createImageBitmap(video);
+  const begin = (frame) => {
+    const work = frame && process(frame, { timeMs: performance.now(), stream: !isFirst });
+    isFirst = false;
+    work?.catch(() => {}); // it is awaited later
+    return work;
+  };
+  let frame = await frames.next();
+  let work = begin(frame);
+  while (mine === run && frame !== null) {
     try {
-      const result = await process(frame, { timeMs: performance.now(), stream: !isFirst });
-      isFirst = false;
+      const result = await work;
+      const following = frames.take();
+      work = begin(following);
       if (mine === run) show(frame, result);
+      frame.close();
+      frame = following;
       say('');
     } catch (error) {
       say(error.message);
       await reload();
       isFirst = true;
-    } finally {
       frame.close();
+      frame = null;
+    }
+    if (frame === null && mine === run) {
+      frame = await frames.next();
+      work = begin(frame);
     }
   }
+  frame?.close();
 }
 
 function stopVideo() {

@@ -17,7 +17,7 @@ struct DensePose {
   maq_context* context = nullptr;
   maq_densepose* densepose = nullptr;
   maq_densepose_result* result = nullptr;
-  std::vector<uint8_t> pixels, drawing;  // RGBA
+  std::vector<uint8_t> pixels;  // RGBA
   int width_px = 0, height_px = 0;
 };
 
@@ -34,7 +34,8 @@ enum Option {
   kPersonCrops,
   kPersonCropSide,
   kHasKeypoints,
-  kSteadiness
+  kSteadiness,
+  kThreads
 };
 
 void close(DensePose* self) {
@@ -93,6 +94,7 @@ EMSCRIPTEN_KEEPALIVE int maq_web_create(const double* options, DensePose** made)
   config.person_crop_px = int32_t(options[kPersonCropSide]);
   config.has_keypoints = int32_t(options[kHasKeypoints]);
   config.steadiness = float(options[kSteadiness]);
+  config.model.threads = int32_t(options[kThreads]);
 
   auto* const self = new DensePose;
   maq_status status = maq_context_create(MAQ_HEADER_VERSION, nullptr, &self->context);
@@ -176,19 +178,5 @@ EMSCRIPTEN_KEEPALIVE int maq_web_stats(DensePose* self, double* stats) {
   std::memcpy(stats, values, sizeof values);
   return MAQ_OK;
 }
-
-// Draws the people over the image, or on transparent ground, in RGBA; null on failure.
-EMSCRIPTEN_KEEPALIVE const uint8_t* maq_web_draw(DensePose* self, int opacity) {
-  maq_densepose_drawing drawing;
-  maq_densepose_drawing_init(&drawing, sizeof drawing);
-  drawing.opacity = opacity;
-  self->drawing.resize(self->pixels.size());
-  const maq_status status =
-      maq_densepose_result_draw(self->result, nullptr, &drawing, self->drawing.data(), 0, self->drawing.size());
-  return status == MAQ_OK ? self->drawing.data() : nullptr;
-}
-
-// The next image begins another stream.
-EMSCRIPTEN_KEEPALIVE int maq_web_reset(DensePose* self) { return maq_densepose_reset(self->densepose); }
 
 }  // extern "C"

@@ -1,6 +1,7 @@
 // The WebAssembly core as objects of JavaScript, on the thread of the caller. densepose.js puts it on a worker.
 import createCore from './maquette-core.mjs';
 import { MaquetteError } from './errors.js';
+import { createMemory } from './memory.js';
 
 // The options in the order of native/binding.cpp, with the values of their names.
 const OPTIONS = [
@@ -66,13 +67,30 @@ function checkOptions(options) {
   return OPTIONS.map((option) => optionNumber(options, option));
 }
 
+// A worker for a thread that the core will start.
+function startThread(pool) {
+  const worker = new Worker(new URL('./thread.js', import.meta.url), { type: 'module' });
+  pool.unusedWorkers.push(worker);
+  return new Promise((resolve, reject) => {
+    pool.loadWasmModuleToWorker(worker, resolve);
+    worker.onerror = ({ message }) => reject(new Error(`a thread ended: ${message ?? 'no reason'}`));
+  });
+}
+
 export class Engine {
-  // `wasm` and `files` (name to bytes) as the package brings them.
-  static async load({ wasm, files, options = {} }) {
-    const numbers = checkOptions(options);
+  // `wasm` and `files` (name to bytes) as the package brings them. More than one thread only where memory can be sent to
+  // workers.
+  static async load({ wasm, files, options = {}, threads = 1 }) {
+    const numbers = [...checkOptions(options), threads];
+    const memory = createMemory();
     let core;
     try {
-      core = await createCore({ wasmBinary: wasm, printErr() {} }); // what it says is in the error
+      core = await createCore({
+        wasmBinary: wasm,
+        wasmMemory: memory,
+        printErr() {}, // what it says is in the error
+      });
+      await Promise.all(Array.from({ length: threads - 1 }, () => startThread(core.PThread)));
     } catch (error) {
       throw new MaquetteError(
         'MAQ_ERROR_UNSUPPORTED',
@@ -80,23 +98,25 @@ export class Engine {
           'needed: Chrome 95, Firefox 100, Safari 16.4 or newer.',
       );
     }
-    return new Engine(core, files, numbers, options.keypoints === true);
+    return new Engine(core, memory, files, numbers, options.keypoints === true);
   }
 
   #core;
+  #memory;
   #self = 0;
   #hasKeypoints;
   #scratch;
   #frame = 0;
 
-  constructor(core, files, numbers, hasKeypoints) {
+  constructor(core, memory, files, numbers, hasKeypoints) {
     this.#core = core;
+    this.#memory = memory;
     this.#hasKeypoints = hasKeypoints;
     this.#scratch = core._malloc(8 * (6 + 3 * KEYPOINTS));
     for (const [name, bytes] of Object.entries(files)) {
       const text = this.#text(name);
-      const memory = core._maq_web_add_file(text, bytes.length);
-      core.HEAPU8.set(bytes, memory);
+      const at = core._maq_web_add_file(text, bytes.length);
+      this.#bytes.set(bytes, at);
       core._free(text);
     }
     core.HEAPF64.set(numbers, this.#scratch / 8);
@@ -123,18 +143,11 @@ export class Engine {
       );
     }
     const pixels = core._maq_web_pixels(this.#self, width, height);
-    core.HEAPU8.set(data, pixels);
+    this.#bytes.set(data, pixels);
     this.#frame = stream ? this.#frame : 0;
     this.#check(core._maq_web_run(this.#self, this.#frame, timeMs));
     this.#frame += 1;
     return { width, height, people: this.#people(), planes: this.#planes(width * height), stats: this.#stats() };
-  }
-
-  // The parts of the last result in colour on transparent ground: RGBA, a view like the planes.
-  draw(opacity = 0) {
-    const pixels = this.#core._maq_web_draw(this.#self, opacity);
-    if (pixels === 0) this.#check(1);
-    return { pixels, heap: this.#core.HEAPU8.buffer };
   }
 
   close() {
@@ -144,7 +157,12 @@ export class Engine {
 
   // The sizes of the core's memory, for tests.
   get memoryBytes() {
-    return this.#core.HEAPU8.length;
+    return this.#memory.buffer.byteLength;
+  }
+
+  // All of the memory, which may have grown since the last call.
+  get #bytes() {
+    return new Uint8Array(this.#memory.buffer);
   }
 
   #text(text) {
@@ -188,7 +206,7 @@ export class Engine {
     return Object.fromEntries(
       Object.entries(PLANES).map(([name, number]) => {
         const at = core._maq_web_plane(this.#self, number);
-        return [name, core.HEAPU8.subarray(at, at + size)];
+        return [name, this.#bytes.subarray(at, at + size)];
       }),
     );
   }

@@ -26,8 +26,10 @@ function readPixels(bitmap) {
 const calls = {
   async load({ wasmUrl, networksUrl, options }) {
     const [wasm, networks] = await Promise.all([fetchBytes(wasmUrl), fetchBytes(networksUrl)]);
-    engine = await Engine.load({ wasm, files: unpackArchive(networks), options });
-    return { result: { version: engine.version } };
+    // As many threads as the native library takes by default. Only pages that are isolated may share memory.
+    const threads = self.crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, 4) : 1;
+    engine = await Engine.load({ wasm, files: unpackArchive(networks), options, threads });
+    return { result: { version: engine.version, threads } };
   },
   async run({ image, options }) {
     const isBitmap = image instanceof ImageBitmap;

@@ -15,7 +15,13 @@ const bundle = join(root, 'sdk/models/densepose-b-int8');
 rmSync(target, { recursive: true, force: true });
 mkdirSync(target, { recursive: true });
 cpSync(join(web, 'src'), target, { recursive: true });
-for (const file of ['maquette-core.mjs', 'maquette-core.wasm']) cpSync(join(root, 'build/web/core', file), join(target, file));
+cpSync(join(root, 'build/web/core/maquette-core.wasm'), join(target, 'maquette-core.wasm'));
+// Emscripten starts threads from a script of its own, which bundlers cannot read; engine.js starts thread.js before.
+const [before, after, ...more] = readFileSync(join(root, 'build/web/core/maquette-core.mjs'), 'utf8').split(
+  'new Worker(new URL("maquette-core.worker.js",import.meta.url))',
+);
+if (after === undefined || more.length > 0) throw new Error('Another version of emscripten starts threads in another way.');
+writeFileSync(join(target, 'maquette-core.mjs'), `${before}undefined${after}`);
 cpSync(join(root, 'LICENSE'), join(target, 'LICENSE'));
 cpSync(join(root, 'sdk/licenses/nlohmann-json.txt'), join(target, 'LICENSE-nlohmann-json.txt'));
 cpSync(join(bundle, 'CREDITS.tsv'), join(target, 'CREDITS.tsv'));
@@ -31,7 +37,11 @@ writeFileSync(
 );
 
 const { default: createCore } = await import(pathToFileURL(join(target, 'maquette-core.mjs')));
-const core = await createCore({ wasmBinary: readFileSync(join(target, 'maquette-core.wasm')) });
+const { createMemory } = await import(pathToFileURL(join(target, 'memory.js')));
+const core = await createCore({
+  wasmBinary: readFileSync(join(target, 'maquette-core.wasm')),
+  wasmMemory: createMemory(),
+});
 const text = (at) => core.UTF8ToString(at);
 const parts = Array.from({ length: 25 }, (_, part) => text(core._maq_web_part_name(part)));
 const keypoints = Array.from({ length: 33 }, (_, keypoint) => text(core._maq_web_keypoint_name(keypoint)));

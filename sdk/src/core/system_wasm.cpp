@@ -1,4 +1,6 @@
 // Memory, cores and files, in WebAssembly.
+#include <pthread.h>
+
 #include <cstdint>
 #include <cstdlib>
 #include <new>
@@ -6,6 +8,9 @@
 #include "core/memory.h"
 #include "core/module.h"
 #include "core/worker_threads.h"
+
+// Emscripten declares it, but does not have it.
+extern "C" int pthread_setname_np(pthread_t, const char*) { return 0; }
 
 namespace maq {
 
@@ -22,7 +27,7 @@ void require_memory(size_t bytes) {
 
 size_t address_space_left() { return SIZE_MAX; }
 
-// The build has no threads.
+// JavaScript tells how many threads there are.
 std::vector<int> allowed_cores() { return {0}; }
 int count_large_cores(const std::vector<int>& allowed, const std::string&) { return int(allowed.size()); }
 

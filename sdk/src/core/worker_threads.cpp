@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/clock.h"
 #include "core/error.h"
 #include "core/thread.h"
 
@@ -14,7 +15,7 @@ int default_threads() {
   return std::clamp(large, 1, kMaxDefault);
 }
 
-WorkerThreads::WorkerThreads(int count) {
+WorkerThreads::WorkerThreads(int count, std::chrono::microseconds patience) : patience_(patience) {
   if (count < 1 || count > kMaxThreads) {
     throw Error(MAQ_ERROR_INVALID_ARGUMENT, "Threads are ", count, ", but must be 1 to ", kMaxThreads, ".");
   }
@@ -59,7 +60,12 @@ void WorkerThreads::run_with(size_t tasks, Call call, void* work) {
   std::unique_lock<std::mutex> lock(mutex_);
   // A thread that has not woken up by now is not waited for.
   is_open_ = false;
-  ends_.wait(lock, [this] { return working_ == 0; });
+  if (working_ != 0) {
+    lock.unlock();
+    look_out([this] { return working_ == 0; });
+    lock.lock();
+    ends_.wait(lock, [this] { return working_ == 0; });
+  }
   if (failure_ != nullptr) std::rethrow_exception(failure_);
 }
 
@@ -73,11 +79,28 @@ void WorkerThreads::take_tasks(int worker) {
   }
 }
 
+template <class Condition>
+void WorkerThreads::look_out(Condition&& is_there) const {
+  if (patience_.count() == 0) return;
+  const auto end = MonotonicClock::now() + patience_;
+  do {
+    for (int i = 0; i < 200; ++i) {
+      if (is_there()) return;
+    }
+  } while (MonotonicClock::now() < end);
+}
+
 void WorkerThreads::stay(int worker) {
   unsigned seen = 0;
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
-    begins_.wait(lock, [&] { return stops_ || (is_open_ && round_ != seen); });
+    const auto is_called = [&] { return stops_ || (is_open_ && round_ != seen); };
+    if (!is_called()) {
+      lock.unlock();
+      look_out(is_called);
+      lock.lock();
+    }
+    begins_.wait(lock, is_called);
     if (stops_) return;
     seen = round_;
     ++working_;

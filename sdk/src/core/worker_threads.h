@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <exception>
@@ -31,8 +32,9 @@ int default_threads();
 class WorkerThreads {
  public:
   // `count` includes the thread that calls run(), so that of 1 none is started. Where the system has no more threads,
-  // count() is less. Throws MAQ_ERROR_INVALID_ARGUMENT unless it is 1 to kMaxThreads.
-  explicit WorkerThreads(int count);
+  // count() is less. A thread looks out for the next work for `patience` before it sleeps: waking one up costs as much
+  // as some small tasks. Throws MAQ_ERROR_INVALID_ARGUMENT unless it is 1 to kMaxThreads.
+  explicit WorkerThreads(int count, std::chrono::microseconds patience = {});
   ~WorkerThreads();
   WorkerThreads(const WorkerThreads&) = delete;
   WorkerThreads& operator=(const WorkerThreads&) = delete;
@@ -54,14 +56,17 @@ class WorkerThreads {
   void take_tasks(int worker);
   void stay(int worker);
   void stop();
+  template <class Condition>
+  void look_out(Condition&& is_there) const;
 
+  const std::chrono::microseconds patience_;
   std::vector<std::thread> threads_;
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
-  // Guarded by the mutex, or of the round that all agree on.
-  unsigned round_ = 0;
-  int working_ = 0;
-  bool is_open_ = false, stops_ = false;
+  // Written under the mutex, or of the round that all agree on.
+  std::atomic<unsigned> round_{0};
+  std::atomic<int> working_{0};
+  std::atomic<bool> is_open_{false}, stops_{false};
   std::exception_ptr failure_;
   size_t tasks_ = 0;
   Call call_ = nullptr;

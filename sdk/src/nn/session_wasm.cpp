@@ -1,9 +1,11 @@
 // The parts of this folder that ask ONNX Runtime, in builds without it.
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
+#include "core/worker_threads.h"
 #include "nn/portable/network.h"
 #include "nn/portable/network_builder.h"
 #include "nn/portable/onnx_model.h"
@@ -45,10 +47,23 @@ std::vector<size_t> places(const char* kind, const std::vector<OnnxValueInfo>& g
   return found;
 }
 
+// The threads of all sessions, which run one after another: a browser has to start each before it is needed. Layers
+// take some 0.1 ms, so that a thread stays awake until the next one.
+std::shared_ptr<WorkerThreads> shared_threads(int count) {
+  static std::weak_ptr<WorkerThreads> shared;
+  std::shared_ptr<WorkerThreads> threads = shared.lock();
+  if (threads == nullptr) {
+    threads = std::make_shared<WorkerThreads>(count, std::chrono::microseconds(200));
+    shared = threads;
+  }
+  return threads;
+}
+
 // A network that runs on the kernels of nn/portable.
 class PortableSession final : public Session {
  public:
-  PortableSession(const std::vector<uint8_t>& bytes, const GraphSpec& spec, const std::string& name) : name_(name) {
+  PortableSession(const std::vector<uint8_t>& bytes, const GraphSpec& spec, const std::string& name, int threads)
+      : name_(name), threads_(shared_threads(threads)) {
     const OnnxModel model = read_onnx(bytes, name);
     inputs_at_ = places("input", model.inputs, spec.inputs, name);
     outputs_at_ = places("output", model.outputs, spec.outputs, name);
@@ -81,7 +96,7 @@ class PortableSession final : public Session {
       views_[i] = {output.floats, output_shapes[i]};
     }
     try {
-      network_->run(inputs_, outputs_);
+      network_->run(inputs_, outputs_, *threads_);
     } catch (const Error& error) {
       throw Error(error.status(), name_, " failed to run: ", error.what());
     }
@@ -92,6 +107,7 @@ class PortableSession final : public Session {
 
  private:
   std::string name_;
+  std::shared_ptr<WorkerThreads> threads_;
   std::optional<PortableNetwork> network_;
   std::vector<size_t> inputs_at_, outputs_at_;
   std::vector<Tensor> inputs_, outputs_;
@@ -114,8 +130,8 @@ void RunCancel::check() const {
 }
 
 std::unique_ptr<Session> open_session(std::shared_ptr<const OnnxRuntimeLibrary>, const std::vector<uint8_t>& bytes,
-                                      GraphSpec spec, std::string name, const SessionSettings&) {
-  return std::make_unique<PortableSession>(bytes, spec, name);
+                                      GraphSpec spec, std::string name, const SessionSettings& settings) {
+  return std::make_unique<PortableSession>(bytes, spec, name, settings.threads);
 }
 
 // Sessions run on nn/portable.

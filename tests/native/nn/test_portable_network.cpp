@@ -1,9 +1,11 @@
 // The layers of builds without ONNX Runtime (WebAssembly), beside ONNX Runtime: the same bits.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/log.h"
+#include "core/worker_threads.h"
 #include "nn/bundle.h"
 #include "nn/portable/network.h"
 #include "nn/portable/network_builder.h"
@@ -58,11 +60,15 @@ class PortableNetwork : public ::testing::Test {
     for (size_t i = 0; i < views.size(); ++i) from[i].floats = const_cast<float*>(views[i].data);
     for (const maq::Shape& shape : shapes) memory.emplace_back(maq::count_of(extents_of(shape)));
     for (size_t i = 0; i < shapes.size(); ++i) to.push_back({extents_of(shapes[i]), nullptr, memory[i].data()});
-    for (int run = 0; run < 2; ++run) network.run(from, to);
-    for (size_t i = 0; i < shapes.size(); ++i) {
-      for (size_t at = 0; at < memory[i].size(); ++at) {
-        ASSERT_NEAR(memory[i][at], expected[i].data[at], tolerance)
-            << graph << ", " << spec.outputs[i].name << ", value " << at;
+    for (const int count : {1, 1, 3}) {
+      maq::WorkerThreads threads(count);
+      network.run(from, to, threads);
+      for (size_t i = 0; i < shapes.size(); ++i) {
+        for (size_t at = 0; at < memory[i].size(); ++at) {
+          ASSERT_NEAR(memory[i][at], expected[i].data[at], tolerance)
+              << graph << ", " << spec.outputs[i].name << ", value " << at << ", " << count << " threads";
+        }
+        std::fill(memory[i].begin(), memory[i].end(), 0.0f);
       }
     }
   }

@@ -15,6 +15,9 @@ constexpr size_t kTile = 4;    // output pixels that a step computes at once
 constexpr size_t kTiles = 32;  // tiles whose inputs stay in the cache while the weights of 8 outputs are used
 constexpr size_t kPixels = kTile * kTiles;
 constexpr int kBlock = 8;  // output channels of a step
+constexpr size_t kDepthwisePixels = 32;
+// Less work than this is not worth waking a thread up: products of one task, some 20 microseconds of them.
+constexpr size_t kProducts = 100000;
 
 int blocks_of(int channels) { return (channels + kBlock - 1) / kBlock; }
 
@@ -42,6 +45,26 @@ inline Ints quantize(Ints low, Ints high, const float* scales, const Quantizatio
   return narrow(round_to_ints(first), round_to_ints(second));
 }
 
+// Calls work(first pixel, pixels, first block, end of blocks, thread) for parts of a layer: the given number of pixels,
+// and all blocks of output channels, or some of them where there are few pixels. `products` counts those of the layer.
+template <class Work>
+void share(WorkerThreads& threads, size_t pixels, size_t part_pixels, int blocks, size_t products, Work&& work) {
+  const size_t parts = (pixels + part_pixels - 1) / part_pixels;
+  const size_t wanted = std::min(4 * size_t(threads.count()), products / kProducts);
+  const size_t groups = threads.count() == 1 ? 1 : std::clamp((wanted + parts - 1) / parts, size_t(1), size_t(blocks));
+  const auto run = [&](size_t task, int thread) {
+    const size_t part = task / groups, group = task % groups, first = part * part_pixels;
+    work(first, std::min(part_pixels, pixels - first), int(size_t(blocks) * group / groups),
+         int(size_t(blocks) * (group + 1) / groups), thread);
+  };
+  const size_t tasks = parts * groups;
+  if (wanted > 1) {
+    threads.run(tasks, [&](size_t task, int thread) { run(task, thread); });
+  } else {
+    for (size_t task = 0; task < tasks; ++task) run(task, 0);
+  }
+}
+
 using Block = std::array<float, kBlock>;
 
 // The pixel that a tap of an output pixel reads, in an image without padding.
@@ -55,9 +78,10 @@ const float* value_at(const Tensor& input, const Windows& windows, int x, int y,
 
 template <class Value>
 const Value* const* TapAddresses<Value>::at(const Value* image, const Extents& input, const Extents& output,
-                                            size_t first, size_t count) {
+                                            size_t first, size_t count, int thread) {
   const size_t taps = size_t(windows_.taps());
-  addresses_.assign(taps * count, zeros_.data());
+  std::vector<const Value*>& addresses = addresses_[size_t(thread)];
+  addresses.assign(taps * count, zeros_.data());
   const size_t columns = size_t(output[2]), pixels = size_t(output[1]) * columns;
   const size_t channels = size_t(input[3]), image_size = size_t(input[1]) * size_t(input[2]) * channels;
   const size_t last = std::min(first + count, size_t(output[0]) * pixels);
@@ -65,7 +89,7 @@ const Value* const* TapAddresses<Value>::at(const Value* image, const Extents& i
     const size_t number = pixel / pixels, place = pixel % pixels;
     const int top = int(place / columns) * windows_.stride - windows_.top;
     const int left = int(place % columns) * windows_.stride - windows_.left;
-    const Value** to = addresses_.data() + (pixel - first);
+    const Value** to = addresses.data() + (pixel - first);
     for (int row = 0; row < windows_.rows; ++row) {
       const int y = top + row * windows_.dilation;
       for (int column = 0; column < windows_.columns; ++column, to += count) {
@@ -75,7 +99,7 @@ const Value* const* TapAddresses<Value>::at(const Value* image, const Extents& i
       }
     }
   }
-  return addresses_.data();
+  return addresses.data();
 }
 
 QuantizedConvolution::QuantizedConvolution(const Windows& windows, int inputs, int outputs,
@@ -107,54 +131,58 @@ Extents QuantizedConvolution::output_extents(const std::vector<const Tensor*>& i
   return convolved(windows_, *inputs[0], inputs_, outputs_);
 }
 
-void QuantizedConvolution::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void QuantizedConvolution::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const Tensor& input = *inputs[0];
   const int taps = windows_.taps();
   const size_t pixels = output.pixels(), block_weights = size_t(taps) * size_t(inputs_) * kBlock;
-  for (size_t first = 0; first < pixels; first += kPixels) {
-    const size_t count = std::min(kPixels, (pixels - first + kTile - 1) / kTile * kTile);
-    const int16_t* const* addresses = addresses_.at(input.quantized, input.extents, output.extents, first, count);
-    for (int block = 0; block < blocks_of(outputs_); ++block) {
-      const int32_t* bias = bias_.data() + kBlock * block;
-      const Ints bias_low = load(bias), bias_high = load(bias + 4);
-      for (size_t tile = 0; tile < count; tile += kTile) {
-        Ints a0 = bias_low, a1 = bias_low, a2 = bias_low, a3 = bias_low;
-        Ints b0 = bias_high, b1 = bias_high, b2 = bias_high, b3 = bias_high;
-        const int16_t* weights = weights_.data() + size_t(block) * block_weights;
-        for (int tap = 0; tap < taps; ++tap) {
-          const int16_t* const* from = addresses + size_t(tap) * count + tile;
-          const int16_t *p0 = from[0], *p1 = from[1], *p2 = from[2], *p3 = from[3];
-          for (int channel = 0; channel < inputs_; channel += 2, weights += 2 * kBlock) {
-            const Ints low = load(weights), high = load(weights + 8);
-            const Ints v0 = repeat_pair(p0 + channel), v1 = repeat_pair(p1 + channel);
-            a0 = add_ints(a0, multiply_pairs(v0, low));
-            b0 = add_ints(b0, multiply_pairs(v0, high));
-            a1 = add_ints(a1, multiply_pairs(v1, low));
-            b1 = add_ints(b1, multiply_pairs(v1, high));
-            const Ints v2 = repeat_pair(p2 + channel), v3 = repeat_pair(p3 + channel);
-            a2 = add_ints(a2, multiply_pairs(v2, low));
-            b2 = add_ints(b2, multiply_pairs(v2, high));
-            a3 = add_ints(a3, multiply_pairs(v3, low));
-            b3 = add_ints(b3, multiply_pairs(v3, high));
+  const int blocks = blocks_of(outputs_);
+  addresses_.prepare(threads.count());
+  share(threads, pixels, kPixels, blocks, pixels * size_t(blocks) * block_weights,
+        [&](size_t first, size_t part, int first_block, int end_block, int thread) {
+          const size_t count = (part + kTile - 1) / kTile * kTile;
+          const int16_t* const* addresses =
+              addresses_.at(input.quantized, input.extents, output.extents, first, count, thread);
+          for (int block = first_block; block < end_block; ++block) {
+            const int32_t* bias = bias_.data() + kBlock * block;
+            const Ints bias_low = load(bias), bias_high = load(bias + 4);
+            for (size_t tile = 0; tile < count; tile += kTile) {
+              Ints a0 = bias_low, a1 = bias_low, a2 = bias_low, a3 = bias_low;
+              Ints b0 = bias_high, b1 = bias_high, b2 = bias_high, b3 = bias_high;
+              const int16_t* weights = weights_.data() + size_t(block) * block_weights;
+              for (int tap = 0; tap < taps; ++tap) {
+                const int16_t* const* from = addresses + size_t(tap) * count + tile;
+                const int16_t *p0 = from[0], *p1 = from[1], *p2 = from[2], *p3 = from[3];
+                for (int channel = 0; channel < inputs_; channel += 2, weights += 2 * kBlock) {
+                  const Ints low = load(weights), high = load(weights + 8);
+                  const Ints v0 = repeat_pair(p0 + channel), v1 = repeat_pair(p1 + channel);
+                  a0 = add_ints(a0, multiply_pairs(v0, low));
+                  b0 = add_ints(b0, multiply_pairs(v0, high));
+                  a1 = add_ints(a1, multiply_pairs(v1, low));
+                  b1 = add_ints(b1, multiply_pairs(v1, high));
+                  const Ints v2 = repeat_pair(p2 + channel), v3 = repeat_pair(p3 + channel);
+                  a2 = add_ints(a2, multiply_pairs(v2, low));
+                  b2 = add_ints(b2, multiply_pairs(v2, high));
+                  a3 = add_ints(a3, multiply_pairs(v3, low));
+                  b3 = add_ints(b3, multiply_pairs(v3, high));
+                }
+              }
+              const float* scales = scales_.data() + kBlock * block;
+              const Ints rows[kTile] = {quantize(a0, b0, scales, to_), quantize(a1, b1, scales, to_),
+                                        quantize(a2, b2, scales, to_), quantize(a3, b3, scales, to_)};
+              const int channels = std::min(kBlock, outputs_ - kBlock * block);
+              for (size_t i = 0; i < kTile && first + tile + i < pixels; ++i) {
+                int16_t* to = output.quantized + (first + tile + i) * size_t(outputs_) + size_t(kBlock * block);
+                if (channels == kBlock) {
+                  store(to, rows[i]);
+                } else {
+                  int16_t values[kBlock];
+                  store(values, rows[i]);
+                  std::copy_n(values, channels, to);
+                }
+              }
+            }
           }
-        }
-        const float* scales = scales_.data() + kBlock * block;
-        const Ints rows[kTile] = {quantize(a0, b0, scales, to_), quantize(a1, b1, scales, to_),
-                                  quantize(a2, b2, scales, to_), quantize(a3, b3, scales, to_)};
-        const int channels = std::min(kBlock, outputs_ - kBlock * block);
-        for (size_t i = 0; i < kTile && first + tile + i < pixels; ++i) {
-          int16_t* to = output.quantized + (first + tile + i) * size_t(outputs_) + size_t(kBlock * block);
-          if (channels == kBlock) {
-            store(to, rows[i]);
-          } else {
-            int16_t values[kBlock];
-            store(values, rows[i]);
-            std::copy_n(values, channels, to);
-          }
-        }
-      }
-    }
-  }
+        });
 }
 
 QuantizedDepthwise::QuantizedDepthwise(const Windows& windows, int channels, const std::vector<int8_t>& weights,
@@ -180,13 +208,14 @@ Extents QuantizedDepthwise::output_extents(const std::vector<const Tensor*>& inp
   return convolved(windows_, *inputs[0], channels_, channels_);
 }
 
-void QuantizedDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void QuantizedDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const Tensor& input = *inputs[0];
-  const size_t taps = size_t(windows_.taps()), pixels = output.pixels();
-  int16_t* to = output.quantized;
-  for (size_t first = 0; first < pixels; first += kPixels) {
-    const size_t count = std::min(kPixels, pixels - first);
-    const int16_t* const* addresses = addresses_.at(input.quantized, input.extents, output.extents, first, count);
+  const size_t taps = size_t(windows_.taps()), pixels = output.pixels(), products = pixels * taps * size_t(channels_);
+  addresses_.prepare(threads.count());
+  share(threads, pixels, kDepthwisePixels, 1, products, [&](size_t first, size_t count, int, int, int thread) {
+    const int16_t* const* addresses =
+        addresses_.at(input.quantized, input.extents, output.extents, first, count, thread);
+    int16_t* to = output.quantized + first * size_t(channels_);
     for (size_t pixel = 0; pixel < count; ++pixel, to += channels_) {
       const int16_t* const* from = addresses + pixel;
       const int16_t* weights = weights_.data();
@@ -201,7 +230,7 @@ void QuantizedDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& o
         store(to + channel, quantize(low, high, scales_.data() + channel, to_));
       }
     }
-  }
+  });
 }
 
 FloatConvolution::FloatConvolution(const Windows& windows, int inputs, int outputs, const std::vector<float>& weights,
@@ -227,51 +256,55 @@ Extents FloatConvolution::output_extents(const std::vector<const Tensor*>& input
   return convolved(windows_, *inputs[0], inputs_, outputs_);
 }
 
-void FloatConvolution::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void FloatConvolution::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const Tensor& input = *inputs[0];
   const int taps = windows_.taps();
   const size_t pixels = output.pixels(), block_weights = size_t(taps) * size_t(inputs_) * kBlock;
   const Floats lowest = repeat(range_.lowest), highest = repeat(range_.highest);
-  for (size_t first = 0; first < pixels; first += kPixels) {
-    const size_t count = std::min(kPixels, (pixels - first + kTile - 1) / kTile * kTile);
-    const float* const* addresses = addresses_.at(input.floats, input.extents, output.extents, first, count);
-    for (int block = 0; block < blocks_of(outputs_); ++block) {
-      const float* bias = bias_.data() + kBlock * block;
-      const Floats bias_low = load(bias), bias_high = load(bias + 4), zero = repeat(0.0f);
-      for (size_t tile = 0; tile < count; tile += kTile) {
-        Floats a0 = zero, a1 = zero, a2 = zero, a3 = zero;
-        Floats b0 = zero, b1 = zero, b2 = zero, b3 = zero;
-        const float* weights = weights_.data() + size_t(block) * block_weights;
-        for (int tap = 0; tap < taps; ++tap) {
-          const float* const* from = addresses + size_t(tap) * count + tile;
-          const float *p0 = from[0], *p1 = from[1], *p2 = from[2], *p3 = from[3];
-          for (int channel = 0; channel < inputs_; ++channel, weights += kBlock) {
-            const Floats low = load(weights), high = load(weights + 4);
-            const Floats v0 = repeat(p0 + channel), v1 = repeat(p1 + channel);
-            a0 = add(a0, multiply(v0, low));
-            b0 = add(b0, multiply(v0, high));
-            a1 = add(a1, multiply(v1, low));
-            b1 = add(b1, multiply(v1, high));
-            const Floats v2 = repeat(p2 + channel), v3 = repeat(p3 + channel);
-            a2 = add(a2, multiply(v2, low));
-            b2 = add(b2, multiply(v2, high));
-            a3 = add(a3, multiply(v3, low));
-            b3 = add(b3, multiply(v3, high));
+  const int blocks = blocks_of(outputs_);
+  addresses_.prepare(threads.count());
+  share(threads, pixels, kPixels, blocks, pixels * size_t(blocks) * block_weights,
+        [&](size_t first, size_t part, int first_block, int end_block, int thread) {
+          const size_t count = (part + kTile - 1) / kTile * kTile;
+          const float* const* addresses =
+              addresses_.at(input.floats, input.extents, output.extents, first, count, thread);
+          for (int block = first_block; block < end_block; ++block) {
+            const float* bias = bias_.data() + kBlock * block;
+            const Floats bias_low = load(bias), bias_high = load(bias + 4), zero = repeat(0.0f);
+            for (size_t tile = 0; tile < count; tile += kTile) {
+              Floats a0 = zero, a1 = zero, a2 = zero, a3 = zero;
+              Floats b0 = zero, b1 = zero, b2 = zero, b3 = zero;
+              const float* weights = weights_.data() + size_t(block) * block_weights;
+              for (int tap = 0; tap < taps; ++tap) {
+                const float* const* from = addresses + size_t(tap) * count + tile;
+                const float *p0 = from[0], *p1 = from[1], *p2 = from[2], *p3 = from[3];
+                for (int channel = 0; channel < inputs_; ++channel, weights += kBlock) {
+                  const Floats low = load(weights), high = load(weights + 4);
+                  const Floats v0 = repeat(p0 + channel), v1 = repeat(p1 + channel);
+                  a0 = add(a0, multiply(v0, low));
+                  b0 = add(b0, multiply(v0, high));
+                  a1 = add(a1, multiply(v1, low));
+                  b1 = add(b1, multiply(v1, high));
+                  const Floats v2 = repeat(p2 + channel), v3 = repeat(p3 + channel);
+                  a2 = add(a2, multiply(v2, low));
+                  b2 = add(b2, multiply(v2, high));
+                  a3 = add(a3, multiply(v3, low));
+                  b3 = add(b3, multiply(v3, high));
+                }
+              }
+              const Floats rows[kTile][2] = {{a0, b0}, {a1, b1}, {a2, b2}, {a3, b3}};
+              const int channels = std::min(kBlock, outputs_ - kBlock * block);
+              for (size_t i = 0; i < kTile && first + tile + i < pixels; ++i) {
+                float* to = output.floats + (first + tile + i) * size_t(outputs_) + size_t(kBlock * block);
+                float values[kBlock];
+                float* target = channels == kBlock ? to : values;
+                store(target, at_most(at_least(add(rows[i][0], bias_low), lowest), highest));
+                store(target + 4, at_most(at_least(add(rows[i][1], bias_high), lowest), highest));
+                if (target == values) std::copy_n(values, channels, to);
+              }
+            }
           }
-        }
-        const Floats rows[kTile][2] = {{a0, b0}, {a1, b1}, {a2, b2}, {a3, b3}};
-        const int channels = std::min(kBlock, outputs_ - kBlock * block);
-        for (size_t i = 0; i < kTile && first + tile + i < pixels; ++i) {
-          float* to = output.floats + (first + tile + i) * size_t(outputs_) + size_t(kBlock * block);
-          float values[kBlock];
-          float* target = channels == kBlock ? to : values;
-          store(target, at_most(at_least(add(rows[i][0], bias_low), lowest), highest));
-          store(target + 4, at_most(at_least(add(rows[i][1], bias_high), lowest), highest));
-          if (target == values) std::copy_n(values, channels, to);
-        }
-      }
-    }
-  }
+        });
 }
 
 void FloatConvolution::run_like_onnxruntime(const Tensor& input, Tensor& output) const {
@@ -325,14 +358,14 @@ Extents FloatDepthwise::output_extents(const std::vector<const Tensor*>& inputs)
   return convolved(windows_, *inputs[0], channels_, channels_);
 }
 
-void FloatDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void FloatDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const Tensor& input = *inputs[0];
-  const size_t taps = size_t(windows_.taps()), pixels = output.pixels();
+  const size_t taps = size_t(windows_.taps()), pixels = output.pixels(), products = pixels * taps * size_t(channels_);
   const Floats lowest = repeat(range_.lowest), highest = repeat(range_.highest);
-  float* to = output.floats;
-  for (size_t first = 0; first < pixels; first += kPixels) {
-    const size_t count = std::min(kPixels, pixels - first);
-    const float* const* addresses = addresses_.at(input.floats, input.extents, output.extents, first, count);
+  addresses_.prepare(threads.count());
+  share(threads, pixels, kDepthwisePixels, 1, products, [&](size_t first, size_t count, int, int, int thread) {
+    const float* const* addresses = addresses_.at(input.floats, input.extents, output.extents, first, count, thread);
+    float* to = output.floats + first * size_t(channels_);
     for (size_t pixel = 0; pixel < count; ++pixel, to += channels_) {
       for (int channel = 0; channel < channels_; channel += 4) {
         Floats sum = repeat(0.0f);
@@ -343,7 +376,7 @@ void FloatDepthwise::run(const std::vector<const Tensor*>& inputs, Tensor& outpu
         store(to + channel, at_most(at_least(add(sum, load(bias_.data() + channel)), lowest), highest));
       }
     }
-  }
+  });
 }
 
 void FloatDepthwise::run_like_onnxruntime(const Tensor& input, Tensor& output) const {

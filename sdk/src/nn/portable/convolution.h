@@ -28,15 +28,19 @@ class TapAddresses {
  public:
   TapAddresses(const Windows& windows, int channels) : windows_(windows), zeros_(size_t(channels)) {}
 
-  // Returns the addresses for `count` pixels from `first` on, counted through all images. Pixels beyond the last read
-  // zeros.
+  // For this many threads.
+  void prepare(int threads) { addresses_.resize(size_t(threads)); }
+
+  // Returns the addresses for `count` pixels from `first` on, counted through all images, in memory of the thread with
+  // that number. Pixels beyond the last read zeros.
   // at()[tap * count + pixel]
-  const Value* const* at(const Value* image, const Extents& input, const Extents& output, size_t first, size_t count);
+  const Value* const* at(const Value* image, const Extents& input, const Extents& output, size_t first, size_t count,
+                         int thread);
 
  private:
   Windows windows_;
   std::vector<Value> zeros_;
-  std::vector<const Value*> addresses_;
+  std::vector<std::vector<const Value*>> addresses_;
 };
 
 // Sums of products with 8 bits, and their quantization. The results equal those that ONNX Runtime's QLinearConv gives.
@@ -47,7 +51,7 @@ class QuantizedConvolution : public Layer {
                        const std::vector<int32_t>& bias, const std::vector<float>& scales, const Quantization& to);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Windows windows_;
@@ -67,7 +71,7 @@ class QuantizedDepthwise : public Layer {
                      const std::vector<int32_t>& bias, const std::vector<float>& scales, const Quantization& to);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Windows windows_;
@@ -110,7 +114,7 @@ class FloatConvolution : public FloatLayer {
                    const std::vector<float>& bias);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
   void run_like_onnxruntime(const Tensor& input, Tensor& output) const override;
   int output_channels() const override { return outputs_; }
 
@@ -128,7 +132,7 @@ class FloatDepthwise : public FloatLayer {
                  const std::vector<float>& bias);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
   void run_like_onnxruntime(const Tensor& input, Tensor& output) const override;
   int output_channels() const override { return channels_; }
 

@@ -17,7 +17,7 @@ class FloatStage : public Layer {
   FloatStage(std::vector<std::unique_ptr<FloatLayer>> layers, const Quantization& to);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   // An image of floats with its memory.
@@ -30,13 +30,14 @@ class FloatStage : public Layer {
 
   // Quantizes one pixel; says whether a value was nearly between two steps.
   bool quantize(const float* from, int16_t* to) const;
-  // Computes one pixel of the output from the pixels of the input that it depends on.
-  const float* compute_again(const Tensor& input, int image, int x, int y);
+  // Computes one pixel of the output from the pixels of the input that it depends on. `windows` is memory.
+  const float* compute_again(const Tensor& input, int image, int x, int y, std::vector<Image>& windows) const;
 
   std::vector<std::unique_ptr<FloatLayer>> layers_;
   Quantization to_;
-  std::vector<Image> images_;   // the output of each layer
-  std::vector<Image> windows_;  // the same, of one pixel of the last one; the first is of the input
+  std::vector<Image> images_;  // the output of each layer
+  // By thread, the same of one pixel of the last one; the first is of the input.
+  std::vector<std::vector<Image>> windows_;
 };
 
 }  // namespace maq

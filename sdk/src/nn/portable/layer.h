@@ -7,6 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/worker_threads.h"
+
 namespace maq {
 
 // Sizes of a tensor in the order of its memory: images, rows, columns, channels.
@@ -50,7 +52,8 @@ class Layer {
 
   // The size of the output. Inputs have the channels that the layer was made for, or it throws MAQ_ERROR_INFERENCE.
   virtual Extents output_extents(const std::vector<const Tensor*>& inputs) const = 0;
-  virtual void run(const std::vector<const Tensor*>& inputs, Tensor& output) = 0;
+  // The output is the same for any number of threads.
+  virtual void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) = 0;
 };
 
 }  // namespace maq

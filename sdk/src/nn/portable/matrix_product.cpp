@@ -40,25 +40,31 @@ Extents MatrixProduct::output_extents(const std::vector<const Tensor*>& inputs) 
   return extents;
 }
 
-void MatrixProduct::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
-  const float* from = inputs[0]->floats;
-  float* to = output.floats;
-  for (size_t pixel = 0; pixel < output.pixels(); ++pixel, from += inputs_, to += outputs_) {
-    for (size_t first = 0; first < outputs_; first += kWidth) {
-      std::array<float, kWidth> result;
-      std::copy_n(bias_.data() + first, kWidth, result.begin());
-      const float* weights = weights_.data() + first * inputs_;
-      for (size_t begin = 0; begin < inputs_; begin += kSummed) {
-        std::array<float, kWidth> sums{};
-        for (size_t input = begin; input < std::min(begin + kSummed, inputs_); ++input, weights += kWidth) {
-          const double value = double(from[input]);
-          for (size_t i = 0; i < kWidth; ++i) sums[i] = float(value * double(weights[i]) + double(sums[i]));
-        }
-        for (size_t i = 0; i < kWidth; ++i) result[i] = sums[i] + result[i];
-      }
-      std::copy_n(result.begin(), std::min(kWidth, outputs_ - first), to + first);
+void MatrixProduct::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
+  const size_t blocks = (outputs_ + kWidth - 1) / kWidth, pixels = output.pixels();
+  // Some 16,384 products a task, but at least those of one pixel and 8 outputs.
+  const size_t part = std::max<size_t>(1, 16384 / (inputs_ * kWidth));
+  threads.run((pixels + part - 1) / part * blocks, [&](size_t task, int) {
+    const size_t first = task % blocks * kWidth, begin = task / blocks * part;
+    for (size_t pixel = begin; pixel < std::min(begin + part, pixels); ++pixel) {
+      multiply(inputs[0]->floats + pixel * inputs_, first, output.floats + pixel * outputs_ + first);
     }
+  });
+}
+
+void MatrixProduct::multiply(const float* from, size_t first, float* to) const {
+  std::array<float, kWidth> result;
+  std::copy_n(bias_.data() + first, kWidth, result.begin());
+  const float* weights = weights_.data() + first * inputs_;
+  for (size_t begin = 0; begin < inputs_; begin += kSummed) {
+    std::array<float, kWidth> sums{};
+    for (size_t input = begin; input < std::min(begin + kSummed, inputs_); ++input, weights += kWidth) {
+      const double value = double(from[input]);
+      for (size_t i = 0; i < kWidth; ++i) sums[i] = float(value * double(weights[i]) + double(sums[i]));
+    }
+    for (size_t i = 0; i < kWidth; ++i) result[i] = sums[i] + result[i];
   }
+  std::copy_n(result.begin(), std::min(kWidth, outputs_ - first), to);
 }
 
 }  // namespace maq

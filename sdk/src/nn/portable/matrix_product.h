@@ -17,9 +17,12 @@ class MatrixProduct : public Layer {
   void set_bias(const std::vector<float>& bias);
 
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
+  // Outputs from `first` on, 8 at most, of one pixel.
+  void multiply(const float* from, size_t first, float* to) const;
+
   size_t inputs_, outputs_;
   std::vector<float> weights_;  // [block of 8 outputs][input][output]
   std::vector<float> bias_;

@@ -41,7 +41,8 @@ void PortableNetwork::plan_memory() {
   }
 }
 
-void PortableNetwork::run(const std::vector<Tensor>& inputs, const std::vector<Tensor>& outputs) {
+void PortableNetwork::run(const std::vector<Tensor>& inputs, const std::vector<Tensor>& outputs,
+                          WorkerThreads& threads) {
   for (size_t i = 0; i < plan_.inputs.size(); ++i) tensors_[size_t(plan_.inputs[i])] = inputs[i];
   for (size_t i = 0; i < plan_.outputs.size(); ++i) tensors_[size_t(plan_.outputs[i])] = outputs[i];
   for (const Step& step : plan_.steps) {
@@ -66,7 +67,7 @@ void PortableNetwork::run(const std::vector<Tensor>& inputs, const std::vector<T
                   ", ", extents[3], "], but [", output.extents[0], ", ", output.extents[1], ", ", output.extents[2],
                   ", ", output.extents[3], "] is expected.");
     }
-    step.layer->run(step_inputs_, output);
+    step.layer->run(step_inputs_, output, threads);
   }
 }
 

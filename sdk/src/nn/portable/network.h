@@ -30,7 +30,7 @@ class PortableNetwork {
 
   // Inputs and outputs in the order of the graph; `outputs` point to memory for the values of their extents, with
   // sizes of 1 where a shape has fewer than four. Throws MAQ_ERROR_INFERENCE where an output has other extents.
-  void run(const std::vector<Tensor>& inputs, const std::vector<Tensor>& outputs);
+  void run(const std::vector<Tensor>& inputs, const std::vector<Tensor>& outputs, WorkerThreads& threads);
 
  private:
   // Gives tensors that are not needed at the same time the same memory.

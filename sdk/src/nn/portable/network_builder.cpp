@@ -209,6 +209,9 @@ class Builder {
       plan_.steps.pop_back();
     }
     if (layers.empty()) return add_step(std::make_unique<Quantize>(to), {tensor}, false);
+    if (layers.back()->output_channels() % 8 != 0) {
+      fail("floats are quantized that have a number of channels that 8 does not divide");
+    }
     return add_step(std::make_unique<FloatStage>(std::move(layers), to), {tensor}, false);
   }
 

@@ -43,6 +43,7 @@ inline Floats divide(Floats a, Floats b) { return wasm_f32x4_div(a, b); }
 inline Floats add(Floats a, Floats b) { return wasm_f32x4_add(a, b); }
 inline Floats at_most(Floats values, Floats limit) { return wasm_f32x4_pmin(values, limit); }
 inline Floats at_least(Floats values, Floats limit) { return wasm_f32x4_pmax(values, limit); }
+inline bool is_any_above(Floats values, Floats limit) { return wasm_v128_any_true(wasm_f32x4_gt(values, limit)); }
 
 #else
 
@@ -76,6 +77,7 @@ inline Floats divide(Floats a, Floats b) { return _mm_div_ps(a, b); }
 inline Floats add(Floats a, Floats b) { return _mm_add_ps(a, b); }
 inline Floats at_most(Floats values, Floats limit) { return _mm_min_ps(limit, values); }
 inline Floats at_least(Floats values, Floats limit) { return _mm_max_ps(limit, values); }
+inline bool is_any_above(Floats values, Floats limit) { return _mm_movemask_ps(_mm_cmpgt_ps(values, limit)) != 0; }
 
 #endif
 
@@ -83,6 +85,14 @@ inline Floats at_least(Floats values, Floats limit) { return _mm_max_ps(limit, v
 inline Ints round_to_ints(Floats values) {
   const Floats shift = repeat(12582912.0f);  // 1.5 * 2^23: the last bit of the sum counts ones
   return subtract_ints(bits(add(values, shift)), bits(shift));
+}
+
+// Whether one of the values lies so near to the middle between two whole numbers that a last bit could decide how it is
+// rounded. `rounded` are the results of round_to_ints().
+inline bool is_nearly_between(Floats values, Ints rounded) {
+  constexpr float kMiddle = 0.5f - 0.0003f;
+  const Floats off = add(values, multiply(to_floats(rounded), repeat(-1.0f)));
+  return is_any_above(multiply(off, off), repeat(kMiddle * kMiddle));
 }
 
 }  // namespace maq::simd

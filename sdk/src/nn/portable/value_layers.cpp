@@ -84,7 +84,7 @@ Extents ChannelsLast::output_extents(const std::vector<const Tensor*>& inputs) c
   return {from[0], from[2], from[3], from[1]};
 }
 
-void ChannelsLast::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void ChannelsLast::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const size_t channels = size_t(output.channels());
   const size_t pixels = size_t(output.rows()) * size_t(output.columns());
   for (size_t image = 0; image < size_t(output.extents[0]); ++image) {
@@ -96,7 +96,7 @@ void ChannelsLast::run(const std::vector<const Tensor*>& inputs, Tensor& output)
   }
 }
 
-void Quantize::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Quantize::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const float* from = inputs[0]->floats;
   const Floats scale = repeat(to_.scale);
   each_eight(count_of(output.extents), [&](size_t at, size_t count) {
@@ -105,7 +105,7 @@ void Quantize::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
   });
 }
 
-void Dequantize::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Dequantize::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const int16_t* from = inputs[0]->quantized;
   const Floats scale = repeat(scale_);
   each_eight(count_of(output.extents), [&](size_t at, size_t count) {
@@ -114,7 +114,7 @@ void Dequantize::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
   });
 }
 
-void Requantize::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Requantize::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const int16_t* from = inputs[0]->quantized;
   const Floats scale = repeat(from_.scale / to_.scale);
   each_eight(count_of(output.extents), [&](size_t at, size_t count) {
@@ -130,28 +130,46 @@ Extents QuantizedSum::output_extents(const std::vector<const Tensor*>& inputs) c
   return a;
 }
 
-void QuantizedSum::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void QuantizedSum::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const Tensor &a = *inputs[0], &b = *inputs[1];
-  // ONNX Runtime has all zero points in one term, and rounds once for a product and a sum.
+  // ONNX Runtime has all zero points in one term, and rounds once for a product and a sum. Two roundings give another
+  // whole number only where the sum is nearly between two, and are done in vectors.
   const float ratio_of_a = a_.scale / to_.scale, ratio_of_b = b_.scale / to_.scale;
   const float fixed = float(to_.zero_point) - (ratio_of_a * float(a_.zero_point) + ratio_of_b * float(b_.zero_point));
-  float of_b[256];  // for each number of b
-  for (int number = 0; number < 256; ++number)
-    of_b[number] = float(double(number) * double(ratio_of_b) + double(fixed));
-  const double of_a = double(ratio_of_a);
-  const int zero_of_a = a_.zero_point, zero_of_b = b_.zero_point, zero = to_.zero_point;
-  const auto sum = [&](const int16_t* from_a, const int16_t* from_b, int16_t* to, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-      const float value = float(double(from_a[i] + zero_of_a) * of_a + double(of_b[from_b[i] + zero_of_b]));
-      to[i] = int16_t(int(std::nearbyint(std::clamp(value, 0.0f, 255.0f))) - zero);
-    }
+  const auto exact = [&](int from_a, int from_b) {
+    const float of_b = float(double(from_b + b_.zero_point) * double(ratio_of_b) + double(fixed));
+    const float value = float(double(from_a + a_.zero_point) * double(ratio_of_a) + double(of_b));
+    return int16_t(int(std::nearbyint(std::clamp(value, 0.0f, 255.0f))) - to_.zero_point);
   };
-  if (a.extents == b.extents) return sum(a.quantized, b.quantized, output.quantized, count_of(a.extents));
-  const size_t channels = size_t(a.channels()), pixels = a.pixels() / size_t(a.extents[0]);
-  for (size_t pixel = 0; pixel < a.pixels(); ++pixel) {
-    const size_t at = pixel * channels;
-    sum(a.quantized + at, b.quantized + pixel / pixels * channels, output.quantized + at, channels);
-  }
+  const Floats lowest = repeat(to_.lowest()), highest = repeat(to_.highest());
+  const auto sum = [&](const int16_t* from_a, const int16_t* from_b, int16_t* to, size_t values) {
+    each_eight(values, [&](size_t at, size_t count) {
+      const Floats8 sums = apply(
+          floats_of(load_some(from_a + at, count)), floats_of(load_some(from_b + at, count)), [&](Floats x, Floats y) {
+            const Floats value = add(multiply(x, repeat(ratio_of_a)), multiply(y, repeat(ratio_of_b)));
+            return at_most(at_least(value, lowest), highest);
+          });
+      const Ints low = round_to_ints(sums.low), high = round_to_ints(sums.high);
+      store_some(to + at, narrow(low, high), count);
+      if (is_nearly_between(sums.low, low) || is_nearly_between(sums.high, high)) {
+        for (size_t i = at; i < at + count; ++i) to[i] = exact(from_a[i], from_b[i]);
+      }
+    });
+  };
+  const size_t channels = size_t(a.channels()), image = size_t(a.rows()) * size_t(a.columns());
+  const bool is_repeated = a.extents != b.extents;
+  constexpr size_t kPixels = 512;
+  threads.run((a.pixels() + kPixels - 1) / kPixels, [&](size_t task, int) {
+    const size_t first = task * kPixels, end = std::min(first + kPixels, a.pixels());
+    if (!is_repeated) {
+      sum(a.quantized + first * channels, b.quantized + first * channels, output.quantized + first * channels,
+          (end - first) * channels);
+    }
+    for (size_t pixel = first; is_repeated && pixel < end; ++pixel) {
+      const size_t at = pixel * channels;
+      sum(a.quantized + at, b.quantized + pixel / image * channels, output.quantized + at, channels);
+    }
+  });
 }
 
 Extents FloatSum::output_extents(const std::vector<const Tensor*>& inputs) const {
@@ -159,7 +177,7 @@ Extents FloatSum::output_extents(const std::vector<const Tensor*>& inputs) const
   return inputs[0]->extents;
 }
 
-void FloatSum::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void FloatSum::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const float *a = inputs[0]->floats, *b = inputs[1]->floats;
   const Floats lowest = repeat(range_.lowest), highest = repeat(range_.highest);
   each_eight(count_of(output.extents), [&](size_t at, size_t count) {
@@ -173,7 +191,7 @@ Extents QuantizedMean::output_extents(const std::vector<const Tensor*>& inputs) 
   return {inputs[0]->extents[0], 1, 1, inputs[0]->channels()};
 }
 
-void QuantizedMean::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void QuantizedMean::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const Tensor& input = *inputs[0];
   const size_t channels = size_t(input.channels());
   const size_t pixels = size_t(input.rows()) * size_t(input.columns());
@@ -200,7 +218,7 @@ Extents Subsample::output_extents(const std::vector<const Tensor*>& inputs) cons
   return {from[0], (from[1] - 1) / stride_ + 1, (from[2] - 1) / stride_ + 1, from[3]};
 }
 
-void Subsample::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Subsample::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   const Tensor& input = *inputs[0];
   const size_t channels = size_t(input.channels());
   int16_t* to = output.quantized;
@@ -227,7 +245,7 @@ Extents Concatenation::output_extents(const std::vector<const Tensor*>& inputs) 
   return extents;
 }
 
-void Concatenation::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Concatenation::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   size_t outer = 1, whole = 1;  // runs, and values of a run
   for (size_t axis = 0; axis < 4; ++axis) (axis < axis_ ? outer : whole) *= size_t(output.extents[axis]);
   size_t begin = 0;
@@ -262,7 +280,7 @@ Extents Reshape::output_extents(const std::vector<const Tensor*>& inputs) const 
   return to;
 }
 
-void Reshape::run(const std::vector<const Tensor*>& inputs, Tensor& output) {
+void Reshape::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) {
   if (output.quantized != nullptr) {
     std::copy_n(inputs[0]->quantized, count_of(output.extents), output.quantized);
   } else {

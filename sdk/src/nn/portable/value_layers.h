@@ -13,7 +13,7 @@ namespace maq {
 class ChannelsLast : public Layer {
  public:
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 };
 
 // Floats to quantized values, like ONNX Runtime's QuantizeLinear.
@@ -21,7 +21,7 @@ class Quantize : public Layer {
  public:
   explicit Quantize(const Quantization& to) : to_(to) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override { return inputs[0]->extents; }
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Quantization to_;
@@ -31,7 +31,7 @@ class Dequantize : public Layer {
  public:
   explicit Dequantize(float scale) : scale_(scale) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override { return inputs[0]->extents; }
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   float scale_;
@@ -42,7 +42,7 @@ class Requantize : public Layer {
  public:
   Requantize(const Quantization& from, const Quantization& to) : from_(from), to_(to) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override { return inputs[0]->extents; }
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Quantization from_, to_;
@@ -53,7 +53,7 @@ class QuantizedSum : public Layer {
  public:
   QuantizedSum(const Quantization& a, const Quantization& b, const Quantization& to) : a_(a), b_(b), to_(to) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Quantization a_, b_, to_;
@@ -64,7 +64,7 @@ class FloatSum : public Layer {
  public:
   void set_range(const FloatRange& range) { range_ = range; }
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   FloatRange range_;
@@ -75,7 +75,7 @@ class QuantizedMean : public Layer {
  public:
   QuantizedMean(const Quantization& from, const Quantization& to) : from_(from), to_(to) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   Quantization from_, to_;
@@ -86,7 +86,7 @@ class Subsample : public Layer {
  public:
   explicit Subsample(int stride) : stride_(stride) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   int stride_;
@@ -97,7 +97,7 @@ class Concatenation : public Layer {
  public:
   explicit Concatenation(size_t axis) : axis_(axis) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   size_t axis_;
@@ -109,7 +109,7 @@ class Reshape : public Layer {
  public:
   explicit Reshape(std::vector<int64_t> extents) : extents_(std::move(extents)) {}
   Extents output_extents(const std::vector<const Tensor*>& inputs) const override;
-  void run(const std::vector<const Tensor*>& inputs, Tensor& output) override;
+  void run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads&) override;
 
  private:
   std::vector<int64_t> extents_;

@@ -64,6 +64,13 @@ export async function openPage(browser, url, { loads = true } = {}) {
   return { page, requests, problems };
 }
 
+// Bytes of JavaScript's heap that are in use.
+export async function heapBytes(page) {
+  const session = await page.createCDPSession();
+  await session.send('HeapProfiler.collectGarbage');
+  return (await page.metrics()).JSHeapUsedSize;
+}
+
 export const frames = (page) => page.evaluate(() => Number(document.body.dataset.frames ?? 0));
 export const waitForFrames = (page, count) =>
   page.waitForFunction((wanted) => Number(document.body.dataset.frames ?? 0) >= wanted, {}, count);

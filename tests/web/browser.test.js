@@ -4,7 +4,7 @@ import { execFileSync } from 'node:child_process';
 import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { frames, launch, openPage, pageFolder, serve, status, waitForFrames } from './browser.js';
+import { frames, heapBytes, launch, openPage, pageFolder, serve, status, waitForFrames } from './browser.js';
 import { converted, root, scratch } from './native.js';
 
 let server;
@@ -46,6 +46,26 @@ test('a camera shows people, nothing is asked of another host, and a report can 
     for (const url of requests) assert.ok(url.startsWith(server.url) || /^(data|blob):/.test(url), url);
     assert.deepEqual(problems, []);
   });
+});
+
+test('a page that is isolated from other origins has threads, another one works without', async () => {
+  const threads = (page) => page.workers().filter((worker) => /thread/.test(worker.url())).length;
+  await withPage(async ({ page }) => {
+    const cores = await page.evaluate(() => navigator.hardwareConcurrency);
+    assert.equal(threads(page), Math.min(cores, 4) - 1);
+  });
+  const other = await serve(pageFolder, { isolated: false });
+  const { page, problems } = await openPage(browser, other.url);
+  try {
+    await (await page.$('#file')).uploadFile(converted('photo.png'));
+    await waitForFrames(page, 1);
+    assert.equal(await page.evaluate(() => document.body.dataset.people), '1');
+    assert.equal(threads(page), 0);
+    assert.deepEqual(problems, []);
+  } finally {
+    await page.close();
+    other.close();
+  }
 });
 
 test('the Content-Security-Policy forbids requests to other hosts', async () => {
@@ -124,15 +144,10 @@ test('memory does not grow with frames', async () => {
     await page.waitForFunction(() => !document.getElementById('camera').disabled);
     await page.click('#camera');
     await waitForFrames(page, 50);
-    const heap = async () => {
-      const session = await page.createCDPSession();
-      await session.send('HeapProfiler.collectGarbage');
-      return (await page.metrics()).JSHeapUsedSize;
-    };
-    const first = await heap();
+    const first = await heapBytes(page);
     const begin = await frames(page);
     await waitForFrames(page, begin + 150);
-    const grown = ((await heap()) - first) / 1e6;
+    const grown = ((await heapBytes(page)) - first) / 1e6;
     console.log(`the JavaScript heap grew by ${grown.toFixed(2)} MB over 150 frames`);
     assert.ok(grown < 1, `${grown} MB`);
   });

@@ -5,7 +5,7 @@ import { extname, join, normalize } from 'node:path';
 import puppeteer from 'puppeteer-core';
 import { converted, root } from './native.js';
 
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
+const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 
 // Serves a folder on this machine; `close` ends it. Files whose names match `damaged` have other bytes, those that match
 // `missing` are not there. A page is `isolated` from other origins where threads are wanted.

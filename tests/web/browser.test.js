@@ -92,6 +92,26 @@ test('a photo shows its people, and a bad file a sentence', async () => {
   });
 });
 
+test('people wear an outfit of the user', async () => {
+  await withPage(async ({ page }) => {
+    await page.select('#overlay', 'outfit');
+    await (await page.$('#file')).uploadFile(converted('photo.png'));
+    await waitForFrames(page, 1);
+    const dressed = () =>
+      page.evaluate(() => {
+        const { width, height } = document.getElementById('view');
+        const { data } = document.getElementById('view').getContext('2d').getImageData(0, 0, width, height);
+        let red = 0;
+        for (let i = 0; i < data.length; i += 4) red += data[i] > 20 && data[i + 1] === 0 && data[i + 2] === 0 ? 1 : 0;
+        return red / (width * height);
+      });
+    assert.ok((await dressed()) < 0.01, 'the outfit of the page is not red');
+    await (await page.$('#texture input')).uploadFile(converted('red.png', '-vf', 'scale=64:96,lutrgb=r=255:g=0:b=0'));
+    await page.waitForFunction(() => Number(document.body.dataset.frames) === 2);
+    assert.ok((await dressed()) > 0.1, `${await dressed()} of the picture`);
+  });
+});
+
 test('a camera that is denied gets a sentence', async () => {
   const denying = await launch({ allowsCamera: false });
   try {

@@ -57,7 +57,8 @@ for (let round = 0; round < rounds; ++round) {
   await page.close();
   const other = await browser.newPage();
   other.on('pageerror', (error) => console.log(error.message));
-  other.setDefaultTimeout(240000);
+  other.on('console', (message) => message.type() === 'error' && !message.text().startsWith('INFO') && console.log(message.text()));
+  other.setDefaultTimeout(60000);
   await other.goto(servers.theirs.url);
   await other.waitForFunction(() => document.body.dataset.report !== undefined);
   line('MediaPipe', JSON.parse(await other.evaluate(() => document.body.dataset.report)));

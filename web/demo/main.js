@@ -2,6 +2,7 @@
 import { DensePose } from 'maquette';
 import { drawOverlay } from './overlay.js';
 import { Measurements } from './measurements.js';
+import defaultOutfit from '../../desktop_demo/assets/outfit.png';
 
 const element = (id) => document.getElementById(id);
 const canvas = element('view');
@@ -12,13 +13,23 @@ const started = performance.now();
 let densepose = null;
 let measurements = new Measurements();
 let run = 0; // of the source that is shown; a new one ends the loop of the one before
+let outfit = null; // the pixels of a texture
 let photo = null; // the last photo, shown again when a setting changes
 
 function say(text) {
   element('status').textContent = text;
 }
 
+async function wear(file) {
+  const image = await createImageBitmap(file);
+  const texture = new OffscreenCanvas(image.width, image.height).getContext('2d');
+  texture.drawImage(image, 0, 0);
+  outfit = texture.getImageData(0, 0, image.width, image.height);
+  image.close();
+}
+
 async function load() {
+  if (outfit === null) await wear(await (await fetch(defaultOutfit)).blob());
   densepose?.close();
   densepose = null;
   const begin = performance.now();
@@ -43,7 +54,7 @@ function show(image, result) {
     canvas.height = result.height;
   }
   context.drawImage(image, 0, 0);
-  drawOverlay(context, result, { kind: element('overlay').value, showsBoxes: element('ids').checked });
+  drawOverlay(context, result, { kind: element('overlay').value, showsBoxes: element('ids').checked, outfit });
   document.body.dataset.people = result.people.length;
   document.body.dataset.frames = measurements.count;
   if (measurements.count === 1) measurements.firstOverlayMs = performance.now() - started;
@@ -186,7 +197,23 @@ element('file').addEventListener('change', ({ target }) => {
   target.value = '';
 });
 for (const id of ['keypoints', 'size']) element(id).addEventListener('change', reload);
-for (const id of ['overlay', 'ids']) element(id).addEventListener('change', () => photo !== null && showPhoto(photo));
+for (const id of ['overlay', 'ids']) {
+  element(id).addEventListener('change', () => {
+    element('texture').hidden = element('overlay').value !== 'outfit';
+    if (photo !== null) showPhoto(photo);
+  });
+}
+element('texture').addEventListener('change', async ({ target }) => {
+  const [file] = target.files;
+  target.value = '';
+  if (file === undefined) return;
+  try {
+    await wear(file);
+    if (photo !== null) await showPhoto(photo);
+  } catch {
+    say(`${file.name} is no image. Take a texture of 24 tiles, such as \`maquette densepose --textures\` writes.`);
+  }
+});
 element('report').addEventListener('click', async () => {
   const text = JSON.stringify(measurements.report(), null, 2);
   document.body.dataset.report = text;

@@ -34,6 +34,21 @@ function drawContours(pixels, { part, u, v }, width) {
   }
 }
 
+// Paints people with a texture of 24 tiles, 4 columns of 6 (docs/guide/texture.md), as bright as the image is there.
+function drawOutfit(pixels, { part, u, v }, { width, height, data }) {
+  const [tileWidth, tileHeight] = [width / 4, height / 6];
+  for (let i = 0; i < part.length; ++i) {
+    if (part[i] === 0) continue;
+    const tile = part[i] - 1;
+    const x = Math.floor(tile / 6) * tileWidth + (u[i] / 256) * tileWidth;
+    const y = (tile % 6) * tileHeight + (1 - (v[i] + 1) / 256) * tileHeight;
+    const from = 4 * (Math.floor(y) * width + Math.floor(x));
+    const at = 4 * i;
+    const light = 0.65 + (0.6 * (0.299 * pixels[at] + 0.587 * pixels[at + 1] + 0.114 * pixels[at + 2])) / 255;
+    for (let channel = 0; channel < 3; ++channel) pixels[at + channel] = light * data[from + channel];
+  }
+}
+
 function drawBoxes(context, people) {
   const size = Math.max(14, context.canvas.width / 40);
   context.font = `${size}px system-ui, sans-serif`;
@@ -58,11 +73,12 @@ function drawBoxes(context, people) {
   }
 }
 
-export function drawOverlay(context, { width, height, planes, people }, { kind, showsBoxes }) {
+export function drawOverlay(context, { width, height, planes, people }, { kind, showsBoxes, outfit }) {
   if (kind !== 'none') {
     const image = context.getImageData(0, 0, width, height);
     if (kind === 'parts') drawParts(image.data, planes);
     if (kind === 'people') drawPeople(image.data, planes, people);
+    if (kind === 'outfit') drawOutfit(image.data, planes, outfit);
     if (kind === 'contours') drawContours(image.data, planes, width);
     context.putImageData(image, 0, 0);
   }

@@ -174,3 +174,9 @@ def test_names_that_do_not_exist_are_found(tmp_path):
         "MAQ_NO_THING",
     ]
     assert len(wrong(page, re.compile(r"python3? -m ([\w.]+)"), module_exists)) == 1
+
+
+def test_readmes_begin_with_a_heading():
+    """A formatter for C++ that gets a README joins its lines and takes the space after `#`."""
+    readmes = [name for name in TRACKED if Path(name).name == "README.md"]
+    assert [name for name in readmes if not Path(name).read_text().startswith("# ")] == []

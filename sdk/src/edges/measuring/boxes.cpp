@@ -18,11 +18,13 @@ constexpr int kMinContacts = 5;        // pairs of pixels of the grid along the 
 constexpr double kMinSideR = 4;        // footprints
 constexpr int kRaster = 20;            // rows and columns of points on a face that are compared with depth
 constexpr double kMaxThrough = 0.08;   // fraction of points of a box behind which something is seen
-constexpr double kMaxThroughFace = 0.2;
+constexpr double kMaxThroughFace = 0.1, kMaxThroughSide = 0.2;  // of a face that was found, and of one that was not
+constexpr double kMarginR = 1.5;      // footprints at the rim of a face that are not compared
 constexpr double kMinAgree = 0.5;
 constexpr double kMinFacePx = 40, kMinSlant = 0.3;  // smaller faces, and those seen at a lower sine, are not compared one by one
 constexpr size_t kClaimPx = 4;          // pixels of a cell that a box claims
 constexpr double kMaxClaimed = 0.3;
+constexpr double kMaxRoundness = 0.06, kMaxMeanSag = 1.0;
 constexpr double kEndSigma_r = 0.15;
 
 // The rotation that is nearest to three directions with weights.
@@ -66,7 +68,12 @@ void BoxFinder::consider(const EdgeField& field, std::array<int, 3> faces) {
   Candidate box;
   box.face = faces;
   WHY("consider %d %d %d\n", faces[0], faces[1], faces[2]);
-  if (measure(field, box)) candidates_.push_back(box);
+  if (!measure(field, box)) return;
+  for (const int face : box.face) {
+    if (face >= 0) WHY("  round %d: %.3f\n", face, regions_.roundness(face));
+    if (face >= 0 && regions_.roundness(face) > kMaxRoundness) return;
+  }
+  candidates_.push_back(box);
 }
 
 bool BoxFinder::measure(const EdgeField& field, Candidate& box) {
@@ -149,12 +156,18 @@ bool BoxFinder::measure_sides(const EdgeField& field, Candidate& box) {
     const size_t k = (j + 1) % 3, l = (j + 2) % 3;
     const std::vector<BorderSample>& samples = border_of(field, region);
     const auto extent_k = extent_.of(regions_, region, box.axis[k]), extent_l = extent_.of(regions_, region, box.axis[l]);
+    double sag = 0, sides = 0;
     for (const int sign : {0, 1}) {
       const FaceSide a = side_.find(regions_, region, samples, box.axis[k], box.axis[l], 2 * sign - 1, extent_k, extent_l, focal);
       const FaceSide b = side_.find(regions_, region, samples, box.axis[l], box.axis[k], 2 * sign - 1, extent_l, extent_k, focal);
       if (a.is_known) ends[k][size_t(sign)].side[ends[k][size_t(sign)].count++] = a;
       if (b.is_known) ends[l][size_t(sign)].side[ends[l][size_t(sign)].count++] = b;
+      for (const FaceSide& side : {a, b}) {
+        if (side.is_known) sag += side.sag, sides += 1;
+      }
     }
+    WHY("    mean sag %.2f of %.0f\n", sag / sides, sides);
+    if (sides >= 2 && sag > kMaxMeanSag * sides) return false;
   }
   const double spacing = all[size_t(std::max({box.face[0], box.face[1], box.face[2]}))].centre.z / focal;
   for (size_t k = 0; k < 3; ++k) {
@@ -193,6 +206,14 @@ bool BoxFinder::measure_sides(const EdgeField& field, Candidate& box) {
   return true;
 }
 
+bool BoxFinder::has_plane_behind(int region) const {
+  const PlaneRegion& face = regions_.regions()[size_t(region)];
+  return std::any_of(regions_.regions().begin(), regions_.regions().end(), [&](const PlaneRegion& other) {
+    return dot(other.plane.normal, face.plane.normal) > kParallel &&
+           dot(face.plane.normal, other.centre - face.centre) < 0 && other.pixels() > face.pixels();
+  });
+}
+
 // A single face: the plane behind it that is seen beyond most of its border.
 bool BoxFinder::stands_on_plane(const EdgeField& field, Candidate& box) {
   if (box.face[1] >= 0 || box.face[2] >= 0) return false;
@@ -225,7 +246,7 @@ bool BoxFinder::raster(const EdgeField& field, const Candidate& box, const SeenF
     if (!face.is_seen) continue;
     const size_t a = (f + 1) % 3, b = (f + 2) % 3;
     const auto along = [&](size_t axis, int step) {
-      const double size = box.high[axis] - box.low[axis], margin = std::min(2.5 * face.footprint_m, 0.2 * size);
+      const double size = box.high[axis] - box.low[axis], margin = std::min(kMarginR * face.footprint_m, 0.2 * size);
       return box.low[axis] + margin + (size - 2 * margin) * (step + 0.5) / kRaster;
     };
     for (int i = 0; i < kRaster; ++i) {
@@ -283,7 +304,8 @@ bool BoxFinder::is_seen(const EdgeField& field, Candidate& box) const {
   constexpr double kPoints = kRaster * kRaster;
   for (size_t k = 0; k < 3; ++k) {
     if (!faces[k].is_seen) continue;
-    if (faces[k].slant >= kMinSlant && faces[k].area_px >= kMinFacePx && through[k] > kMaxThroughFace * (agree[k] + through[k])) { WHY("  through face %zu: %.0f, %.0f agree, %.0f px\n", k, through[k], agree[k], faces[k].area_px); return false; }
+    const double most = box.face[k] >= 0 ? kMaxThroughFace : kMaxThroughSide;
+    if (faces[k].slant >= kMinSlant && faces[k].area_px >= kMinFacePx && through[k] > most * (agree[k] + through[k])) { WHY("  through face %zu: %.0f, %.0f agree, %.0f px\n", k, through[k], agree[k], faces[k].area_px); return false; }
     if (box.face[k] >= 0 && agree[k] < kMinAgree * kPoints) { WHY("  face %zu agrees in %.0f\n", k, agree[k]); return false; }
     const double weight = faces[k].area_px / kPoints;
     agree_all += weight * agree[k], through_all += weight * through[k], all += faces[k].area_px;
@@ -339,7 +361,9 @@ void BoxFinder::find(const EdgeField& field, std::vector<MeasuredBox>& found, do
       consider(field, {shared, one, other});
     }
   }
-  for (size_t i = 0; i < count; ++i) consider(field, {int(i), -1, -1});
+  for (size_t i = 0; i < count; ++i) {
+    if (has_plane_behind(int(i))) consider(field, {int(i), -1, -1});
+  }
   std::sort(candidates_.begin(), candidates_.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
   is_taken_.assign(count, 0);

@@ -48,6 +48,7 @@ class BoxFinder {
   bool measure(const EdgeField& field, Candidate& box);
   bool measure_sides(const EdgeField& field, Candidate& box);
   bool stands_on_plane(const EdgeField& field, Candidate& box);
+  bool has_plane_behind(int region) const;
   void turn_to_sides(const EdgeField& field, Candidate& box);
   bool is_seen(const EdgeField& field, Candidate& box) const;
   bool is_claimed(const EdgeField& field, const Candidate& box);

@@ -17,12 +17,15 @@ constexpr int kUnlabelledPx = 5;   // pixels of the grid without a region that a
 constexpr int kGapPx = 3;          // of unknown depth, of the grid
 constexpr double kContactR = 2.5;  // footprints between a border and the plane that it touches
 constexpr int kMixedPx = 4;         // pixels between both sides of a jump in depth that may be of neither
+constexpr int kMaxWideningPx = 4;
+constexpr float kMinWideningR = 1;
 constexpr double kMaxContactCosine = 0.3, kMinFall = 0.6;
 constexpr double kBandR = 8, kBandFraction = 0.05;  // half-width of the band in which a side lies
 constexpr int kBins = 24;                           // parts of a side
 constexpr double kMinSeen = 0.35;
 constexpr int kMinSamples = 5;
 constexpr double kMaxScatterR = 2.5;
+constexpr double kMaxSagR = 1, kMaxSagFraction = 0.04, kMaxSideSag = 2.5;  // by which a straight side may seem to bend
 constexpr double kMaxTilt = 0.14;  // sine of the angle between a touched plane and a side's direction
 
 double signed_distance(const Plane& plane, Vec3 point) { return dot(plane.normal, point) - plane.offset_m; }
@@ -31,6 +34,20 @@ double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + ptrdiff_t(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+// By how many pixels the sensor shows a face too wide at a jump in depth, as matching of windows does: the network puts
+// the edge where its distance is least.
+template <class IsFace>
+int widening(const EdgeField& field, int u, int v, int du, int dv, const IsFace& is_face) {
+  const auto distance = [&](int t) {
+    return field.distance_r[size_t(v - t * dv) * size_t(field.width) + size_t(u - t * du)];
+  };
+  int least = 0;
+  for (int t = 1; t <= kMaxWideningPx && is_face(u - t * du, v - t * dv); ++t) {
+    if (distance(t) < distance(least)) least = t;
+  }
+  return distance(0) - distance(least) >= kMinWideningR ? least : 0;
 }
 
 }  // namespace
@@ -128,7 +145,8 @@ void FaceBorder::find(const EdgeField& field, const PlaneRegions& regions, int r
         }
         sample.is_across_gap = unknown > kGapPx * step;
         const double half = beyond != 0 && last <= kMixedPx ? 0.5 * last : 0.5;
-        sample.point = point_at(u + half * du, v + half * dv);
+        const int wide = beyond != 0 && at > 0 && !field.distance_r.empty() ? widening(field, u, v, du, dv, is_face) : 0;
+        sample.point = point_at(u + (half - wide) * du, v + (half - wide) * dv);
         sample.outward = normalized(point_at(u + du, v + dv) - point_at(u, v));
         sample.beyond = uint8_t(beyond);
         if (!(sample.point.z > 0) || !is_finite(sample.point)) continue;
@@ -156,7 +174,8 @@ void FaceBorder::find(const EdgeField& field, const PlaneRegions& regions, int r
 std::array<double, 2> FaceExtent::of(const PlaneRegions& regions, int region, Vec3 axis) {
   const PlaneRegion& face = regions.regions()[size_t(region)];
   positions_.clear();
-  for (int row = face.top; row <= face.bottom; ++row) {
+  const int stride = 1 + face.pixels() / 6000;  // in rows
+  for (int row = face.top; row <= face.bottom; row += stride) {
     for (int column = face.left; column <= face.right; ++column) {
       if (regions.label(column, row) != region + 1) continue;
       const double x = double(regions.ray_x(column)), y = double(regions.ray_y(row));
@@ -201,6 +220,17 @@ FaceSide SideFinder::find(const PlaneRegions& regions, int region, const std::ve
   const double scatter = 1.48 * median_of(sorted_);
   WHY("      scatter %.4f spacing %.4f\n", scatter, spacing);
   if (scatter > kMaxScatterR * spacing + 2 * regions.error().at(face.centre.z)) return side;
+  // A round outline falls back towards both ends.
+  double parts[2] = {}, counts[2] = {};
+  for (size_t i = 0; i < positions_.size(); ++i) {
+    const double t = (dot(used_[i]->point, across) - extent_across[0]) / length;
+    const size_t part = std::abs(t - 0.5) > 1.0 / 6 ? 1 : 0;
+    parts[part] += sign * positions_[i], counts[part] += 1;
+  }
+  const double sag = counts[0] > 0 && counts[1] > 0 ? parts[0] / counts[0] - parts[1] / counts[1] : 0;
+  side.sag = sag / std::max(kMaxSagR * spacing + 0.5 * regions.error().at(face.centre.z), kMaxSagFraction * length);
+  WHY("      sag %.2f\n", side.sag);
+  if (side.sag > kMaxSideSag) return side;
   const double limit = 2.5 * scatter + 0.7 * spacing;
   double sum = 0, squares = 0, count = 0, gaps = 0;
   uint32_t bins = 0;

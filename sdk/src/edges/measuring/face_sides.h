@@ -28,6 +28,7 @@ struct FaceSide {
   bool is_known = false;
   double position_m = 0;  // along an axis
   double sigma_m = 0;     // its standard deviation
+  double sag = 0;         // by how much it falls back towards its ends, as a straight side does not; 1: too much
   double seen = 0;        // fraction of the side along which the face is seen to end
 };
 

@@ -106,16 +106,15 @@ void PlaneRegions::find_seeds() {
       InversePlane plane;
       double rms = 0;
       if (!window_sums(i, j, sums) || !fit_inverse_plane(sums, plane, rms)) continue;
-      seeds_.push_back({j * width_ + i, float(rms)});
+      const double octaves = std::log2(double(inverse_[size_t(j * width_ + i)]));
+      const int bin = std::clamp(int(kDepthBins / 2.0 - kBinsOfAnOctave * octaves), 0, kDepthBins - 1);
+      seeds_.push_back({j * width_ + i, float(rms), bin});
     }
   }
 }
 
 // The lower quartile of the seeds' residuals at each depth, and the steps in which depth comes.
 void PlaneRegions::estimate_error() {
-  const auto bin_of = [](float inverse_depth) {
-    return std::clamp(int(kBinsOfAnOctave * std::log2(1 / double(inverse_depth)) + kDepthBins / 2.0), 0, kDepthBins - 1);
-  };
   double sums[2][2] = {}, right[2] = {};
   const auto quantile = [&](double fraction) {
     const auto at = samples_.begin() + ptrdiff_t(fraction * double(samples_.size() - 1));
@@ -128,14 +127,15 @@ void PlaneRegions::estimate_error() {
     samples_.clear();
     for (const Seed& seed : seeds_) {
       const float w = inverse_[size_t(seed.cell)];
-      if (bin_of(w) == bin) samples_.push_back(seed.roughness / (w * w));
+      if (seed.bin == bin) samples_.push_back(seed.roughness / (w * w));
     }
     counts[size_t(bin)] = samples_.size();
     if (samples_.size() >= kMinBinSamples) rough[size_t(bin)] = quantile(0.25);
     samples_.clear();
     for (const Seed& seed : seeds_) {
-      const float w = inverse_[size_t(seed.cell)], beside = inverse_[size_t(seed.cell) + 1];
-      if (bin_of(w) == bin && beside > 0 && beside != w) samples_.push_back(std::abs(1 / w - 1 / beside));
+      const size_t at = size_t(seed.cell);
+      const float w = inverse_[at], bend = std::abs(inverse_[at - 1] - 2 * w + inverse_[at + 1]);
+      if (seed.bin == bin && bend > 0) samples_.push_back(bend / (w * w));
     }
     if (samples_.size() >= kMinBinSamples) steps[size_t(bin)] = quantile(0.2);
   }
@@ -357,6 +357,52 @@ void PlaneRegions::join_regions() {
   regions_.resize(kept);
   for (uint8_t& label : labels_) label = final_label[joined[label]];
   count_contacts();
+}
+
+// Fits a paraboloid to the distances of its points from its plane.
+double PlaneRegions::roundness(int region) const {
+  const PlaneRegion& face = regions_[size_t(region)];
+  const Vec3 along = any_orthogonal(face.plane.normal), across = cross(face.plane.normal, along);
+  constexpr size_t kTerms = 6;
+  std::array<std::array<double, kTerms + 1>, kTerms> rows{};
+  const double scale = 1 / std::sqrt(double(face.pixels())) / (face.centre.z / focal_px_ * step_);  // to about 1
+  for (int row = face.top; row <= face.bottom; ++row) {
+    for (int column = face.left; column <= face.right; ++column) {
+      if (label(column, row) != region + 1) continue;
+      const double depth = 1 / double(inverse_[size_t(row) * size_t(width_) + size_t(column)]);
+      const Vec3 from = Vec3{depth * double(x_[size_t(column)]), depth * double(y_[size_t(row)]), depth} - face.centre;
+      const double s = scale * dot(from, along), t = scale * dot(from, across), h = scale * dot(from, face.plane.normal);
+      const std::array<double, kTerms + 1> terms{1, s, t, s * s, s * t, t * t, h};
+      for (size_t i = 0; i < kTerms; ++i) {
+        for (size_t j = i; j <= kTerms; ++j) rows[i][j] += terms[i] * terms[j];
+      }
+    }
+  }
+  const double n = rows[0][0], spread_s = rows[0][3] / n, spread_t = rows[0][5] / n, spread_st = rows[0][4] / n;
+  for (size_t i = 0; i < kTerms; ++i) {
+    for (size_t j = 0; j < i; ++j) rows[i][j] = rows[j][i];
+  }
+  for (size_t i = 0; i < kTerms; ++i) {
+    if (!(rows[i][i] > 1e-9 * n)) return 0;
+    for (size_t k = i + 1; k < kTerms; ++k) {
+      const double factor = rows[k][i] / rows[i][i];
+      for (size_t j = i; j <= kTerms; ++j) rows[k][j] -= factor * rows[i][j];
+    }
+  }
+  std::array<double, kTerms> solution{};
+  for (size_t i = kTerms; i-- > 0;) {
+    double sum = rows[i][kTerms];
+    for (size_t j = i + 1; j < kTerms; ++j) sum -= rows[i][j] * solution[j];
+    solution[i] = sum / rows[i][i];
+  }
+  const double a = solution[3], b = 0.5 * solution[4], c = solution[5];
+  const double root = std::hypot(0.5 * (a - c), b);
+  const double angle = 0.5 * std::atan2(2 * b, a - c) + (a + c < 0 ? M_PI / 2 : 0);
+  const double bend = 0.5 * (a + c) + (a + c < 0 ? -root : root);  // h = bend * s^2 along that direction
+  const double cosine = std::cos(angle), sine = std::sin(angle);
+  const double spread = cosine * cosine * spread_s + 2 * cosine * sine * spread_st + sine * sine * spread_t;
+  const double chord = std::sqrt(12 * std::max(0.0, spread));  // of a uniform distribution
+  return std::abs(bend) * chord / 4;
 }
 
 }  // namespace maq

@@ -65,6 +65,8 @@ class PlaneRegions {
   float ray_x(int column) const { return x_[size_t(column)]; }
   float ray_y(int row) const { return y_[size_t(row)]; }
   const std::vector<uint8_t>& labels() const { return labels_; }
+  // How round a region is: the height of its arc, as a fraction of the chord, where it bends most.
+  double roundness(int region) const;
   const DepthError& error() const { return error_; }
   // Depth that differs by less from a plane belongs to it, as inverse depth.
   double tolerance(double inverse_depth) const;
@@ -75,7 +77,8 @@ class PlaneRegions {
  private:
   struct Seed {
     int cell;
-    float roughness;
+    float roughness;  // root mean square residual of its window
+    int bin;          // of depth
   };
 
   bool set_plane(PlaneRegion& region, double& rms) const;

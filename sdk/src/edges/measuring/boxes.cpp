@@ -2,30 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
-#ifdef BOXDEV
-#include <cstdio>
-#define WHY(...) std::fprintf(stderr, __VA_ARGS__)
-#else
-#define WHY(...)
-#endif
 
 namespace maq {
 namespace {
 
-constexpr double kRightAngle = 0.12;   // cosine of the angle between two faces of a box
-constexpr double kParallel = 0.996;    // cosine between a face and the plane that a box stands on
-constexpr int kMinContacts = 5;        // pairs of pixels of the grid along the crease of two faces
-constexpr double kMinSideR = 4;        // footprints
-constexpr int kRaster = 20;            // rows and columns of points on a face that are compared with depth
-constexpr double kMaxThrough = 0.08;   // fraction of points of a box behind which something is seen
+constexpr double kRightAngle = 0.12;  // cosine of the angle between two faces of a box
+constexpr double kParallel = 0.996;   // cosine between a face and the plane that a box stands on
+constexpr int kMinContacts = 5;       // pairs of pixels of the grid along the crease of two faces
+constexpr size_t kMaxPairs = 48;      // those with the longest creases, in a cluttered frame
+constexpr double kMinSideR = 4;       // footprints
+constexpr int kRaster = 20;           // rows and columns of points on a face that are compared with depth
+constexpr double kMaxThrough = 0.08;  // fraction of points of a box behind which something is seen
 constexpr double kMaxThroughFace = 0.1, kMaxThroughSide = 0.2;  // of a face that was found, and of one that was not
-constexpr double kMarginR = 1.5;      // footprints at the rim of a face that are not compared
-constexpr double kMinAgree = 0.5;
-constexpr double kMinFacePx = 40, kMinSlant = 0.3;  // smaller faces, and those seen at a lower sine, are not compared one by one
-constexpr size_t kClaimPx = 4;          // pixels of a cell that a box claims
-constexpr double kMaxClaimed = 0.3;
-constexpr double kMaxRoundness = 0.06, kMaxMeanSag = 1.0;
-constexpr double kEndSigma_r = 0.15;
+constexpr double kMarginR = 1.5;                                // footprints at the rim of a face that are not compared
+constexpr double kMinAgree = 0.5;                               // fraction of its points that depth agrees with
+// Smaller faces, and those seen at a lower sine, are not compared one by one.
+constexpr double kMinFacePx = 40, kMinSlant = 0.3;
+constexpr double kMoreFaces = 0.1;   // by which each further face makes a box better
+constexpr size_t kClaimPx = 4;       // pixels of a cell that a box claims
+constexpr double kMaxClaimed = 0.3;  // fraction of a box that may lie where another is
+// Faces that bend more, or whose outline does, belong to round things.
+constexpr double kMaxRoundness = 0.06, kMaxMeanSag = 1;
 
 // The rotation that is nearest to three directions with weights.
 void orthonormalize(std::array<Vec3, 3>& axis) {
@@ -61,19 +58,30 @@ void BoxFinder::find_pairs() {
       pairs_.push_back({int(a), int(b), contacts});
     }
   }
+  if (pairs_.size() <= kMaxPairs) return;
+  std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
+    return a.contacts != b.contacts ? a.contacts > b.contacts : a.a != b.a ? a.a < b.a : a.b < b.b;
+  });
+  pairs_.resize(kMaxPairs);
 }
 
-// Orders the axes so that each face has its own.
 void BoxFinder::consider(const EdgeField& field, std::array<int, 3> faces) {
   Candidate box;
   box.face = faces;
-  WHY("consider %d %d %d\n", faces[0], faces[1], faces[2]);
   if (!measure(field, box)) return;
   for (const int face : box.face) {
-    if (face >= 0) WHY("  round %d: %.3f\n", face, regions_.roundness(face));
     if (face >= 0 && regions_.roundness(face) > kMaxRoundness) return;
   }
   candidates_.push_back(box);
+}
+
+// Of its nearest face.
+double BoxFinder::depth_of(const Candidate& box) const {
+  double depth = INFINITY;
+  for (const int face : box.face) {
+    if (face >= 0) depth = std::min(depth, regions_.regions()[size_t(face)].centre.z);
+  }
+  return depth;
 }
 
 bool BoxFinder::measure(const EdgeField& field, Candidate& box) {
@@ -89,7 +97,7 @@ bool BoxFinder::measure(const EdgeField& field, Candidate& box) {
     if (!stands_on_plane(field, box)) return false;
     const Vec3 normal = normalized(box.axis[0]);
     box.axis = {normal, any_orthogonal(normal), cross(normal, any_orthogonal(normal))};
-    turn_to_sides(field, box);
+    turn_to_sides(box);
   } else {
     if (known == 2) {
       const Vec3 third = cross(box.axis[0], box.axis[1]);
@@ -104,37 +112,28 @@ bool BoxFinder::measure(const EdgeField& field, Candidate& box) {
   if (!measure_sides(field, box)) return false;
   for (size_t k = 0; k < 3; ++k) {
     const double size = box.high[k] - box.low[k];
-    double least = INFINITY;
-    for (const int face : box.face) {
-      if (face >= 0) least = std::min(least, all[size_t(face)].centre.z);
-    }
-    if (!(size >= kMinSideR * least / focal_px(field.intrinsics))) { WHY("  small %.4f\n", size); return false; }
+    if (!(size >= kMinSideR * depth_of(box) / focal_px(field.intrinsics))) return false;
   }
   return is_seen(field, box);
 }
 
-// In-plane directions of a single face: those of the smallest rectangle, in steps, then by the slopes of its sides.
-void BoxFinder::turn_to_sides(const EdgeField& field, Candidate& box) {
+// Of a single face, the directions in its plane are those of its smallest rectangle.
+void BoxFinder::turn_to_sides(Candidate& box) {
   const int face = box.face[0];
-  const auto turned = [&](double angle) {
-    return std::cos(angle) * box.axis[1] + std::sin(angle) * box.axis[2];
-  };
+  const auto turned = [&](double angle) { return std::cos(angle) * box.axis[1] + std::sin(angle) * box.axis[2]; };
   double best = 0, least = INFINITY;
-  constexpr int kSteps = 18;
-  for (int k = 0; k < kSteps; ++k) {
-    const double angle = k * M_PI / 2 / kSteps;
-    const auto one = extent_.of(regions_, face, turned(angle)), other = extent_.of(regions_, face, turned(angle + M_PI / 2));
+  const auto look = [&](double angle) {
+    const auto one = extent_.of(regions_, face, turned(angle));
+    const auto other = extent_.of(regions_, face, turned(angle + M_PI / 2));
     const double area = (one[1] - one[0]) * (other[1] - other[0]);
     if (area < least) least = area, best = angle;
-  }
+  };
+  constexpr int kSteps = 18;
+  for (int k = 0; k < kSteps; ++k) look(k * M_PI / 2 / kSteps);
   for (double step = M_PI / 4 / kSteps; step > 2e-3; step /= 2) {
-    for (const double angle : {best - step, best + step}) {
-      const auto one = extent_.of(regions_, face, turned(angle)), other = extent_.of(regions_, face, turned(angle + M_PI / 2));
-      const double area = (one[1] - one[0]) * (other[1] - other[0]);
-      if (area < least) least = area, best = angle;
-    }
+    const double from = best;
+    look(from - step), look(from + step);
   }
-  (void)field;
   box.axis[1] = turned(best);
   box.axis[2] = cross(box.axis[0], box.axis[1]);
 }
@@ -152,37 +151,38 @@ bool BoxFinder::measure_sides(const EdgeField& field, Candidate& box) {
     const int region = box.face[j];
     const PlaneRegion& face = all[size_t(region)];
     box.high[j] = dot(box.axis[j], face.centre);
-    box.high_sigma[j] = kEndSigma_r * face.centre.z / focal + 0.2 * regions_.error().at(face.centre.z);
+    box.high_sigma[j] = plane_sigma(regions_, region, focal);
     const size_t k = (j + 1) % 3, l = (j + 2) % 3;
     const std::vector<BorderSample>& samples = border_of(field, region);
-    const auto extent_k = extent_.of(regions_, region, box.axis[k]), extent_l = extent_.of(regions_, region, box.axis[l]);
+    const auto extent_k = extent_.of(regions_, region, box.axis[k]),
+               extent_l = extent_.of(regions_, region, box.axis[l]);
     double sag = 0, sides = 0;
     for (const int sign : {0, 1}) {
-      const FaceSide a = side_.find(regions_, region, samples, box.axis[k], box.axis[l], 2 * sign - 1, extent_k, extent_l, focal);
-      const FaceSide b = side_.find(regions_, region, samples, box.axis[l], box.axis[k], 2 * sign - 1, extent_l, extent_k, focal);
+      const FaceSide a =
+          side_.find(regions_, region, samples, box.axis[k], box.axis[l], 2 * sign - 1, extent_k, extent_l, focal);
+      const FaceSide b =
+          side_.find(regions_, region, samples, box.axis[l], box.axis[k], 2 * sign - 1, extent_l, extent_k, focal);
       if (a.is_known) ends[k][size_t(sign)].side[ends[k][size_t(sign)].count++] = a;
       if (b.is_known) ends[l][size_t(sign)].side[ends[l][size_t(sign)].count++] = b;
       for (const FaceSide& side : {a, b}) {
         if (side.is_known) sag += side.sag, sides += 1;
       }
     }
-    WHY("    mean sag %.2f of %.0f\n", sag / sides, sides);
     if (sides >= 2 && sag > kMaxMeanSag * sides) return false;
   }
-  const double spacing = all[size_t(std::max({box.face[0], box.face[1], box.face[2]}))].centre.z / focal;
+  const double spacing = depth_of(box) / focal;  // a footprint
   for (size_t k = 0; k < 3; ++k) {
     for (const int sign : {0, 1}) {
       End& end = ends[k][size_t(sign)];
       if (sign == 1 && box.face[k] >= 0) {  // the face itself; its neighbours must end there
         for (int i = 0; i < end.count; ++i) {
           const double limit = 3 * (end.side[i].sigma_m + box.high_sigma[k]) + 4 * spacing;
-          if (std::abs(end.side[i].position_m - box.high[k]) > limit) { WHY("  neighbour ends elsewhere: axis %zu, %.4f and %.4f, limit %.4f\n", k, end.side[i].position_m, box.high[k], limit); return false; }
+          if (std::abs(end.side[i].position_m - box.high[k]) > limit) return false;
         }
         continue;
       }
       if (end.count == 0) {
         if (sign == 0 && box.face[k] >= 0 && stands_on_plane(field, box)) continue;
-        WHY("  side unknown: axis %zu sign %d\n", k, sign);
         return false;
       }
       double position = end.side[0].position_m, sigma = end.side[0].sigma_m;
@@ -190,7 +190,7 @@ bool BoxFinder::measure_sides(const EdgeField& field, Candidate& box) {
         const FaceSide &a = end.side[0], &b = end.side[1];
         const double apart = std::abs(a.position_m - b.position_m);
         if (apart > 3 * std::hypot(a.sigma_m, b.sigma_m) + 3 * spacing) {
-          if (std::max(a.seen, b.seen) < 0.7 || std::min(a.seen, b.seen) > 0.5) { WHY("  sides differ: axis %zu sign %d %.4f (seen %.2f) %.4f (%.2f)\n", k, sign, a.position_m, a.seen, b.position_m, b.seen); return false; }
+          if (std::max(a.seen, b.seen) < 0.7 || std::min(a.seen, b.seen) > 0.5) return false;
           const FaceSide& better = a.seen > b.seen ? a : b;
           position = better.position_m, sigma = better.sigma_m;
         } else {
@@ -232,7 +232,7 @@ bool BoxFinder::stands_on_plane(const EdgeField& field, Candidate& box) {
   const double slope = dot(under.plane.normal, normalized(box.axis[0]));
   if (slope < kParallel) return false;
   box.low[0] = box.high[0] + (under.plane.offset_m - dot(under.plane.normal, face.centre)) / slope;
-  box.low_sigma[0] = kEndSigma_r * face.centre.z / focal_px(field.intrinsics) + 0.2 * regions_.error().at(under.centre.z);
+  box.low_sigma[0] = plane_sigma(regions_, int(most) - 1, focal_px(field.intrinsics));
   return true;
 }
 
@@ -276,8 +276,8 @@ BoxFinder::SeenFaces BoxFinder::faces_to_camera(const Candidate& box, double foc
                         0.5 * (box.low[b] + box.high[b]) * box.axis[b];
     face.footprint_m = middle.z / focal;
     face.slant = std::abs(dot(box.axis[k], normalized(middle)));
-    face.area_px = (box.high[a] - box.low[a]) * (box.high[b] - box.low[b]) * face.slant /
-                   (face.footprint_m * face.footprint_m);
+    face.area_px =
+        (box.high[a] - box.low[a]) * (box.high[b] - box.low[b]) * face.slant / (face.footprint_m * face.footprint_m);
   }
   return faces;
 }
@@ -305,13 +305,14 @@ bool BoxFinder::is_seen(const EdgeField& field, Candidate& box) const {
   for (size_t k = 0; k < 3; ++k) {
     if (!faces[k].is_seen) continue;
     const double most = box.face[k] >= 0 ? kMaxThroughFace : kMaxThroughSide;
-    if (faces[k].slant >= kMinSlant && faces[k].area_px >= kMinFacePx && through[k] > most * (agree[k] + through[k])) { WHY("  through face %zu: %.0f, %.0f agree, %.0f px\n", k, through[k], agree[k], faces[k].area_px); return false; }
-    if (box.face[k] >= 0 && agree[k] < kMinAgree * kPoints) { WHY("  face %zu agrees in %.0f\n", k, agree[k]); return false; }
+    if (faces[k].slant >= kMinSlant && faces[k].area_px >= kMinFacePx && through[k] > most * (agree[k] + through[k]))
+      return false;
+    if (box.face[k] >= 0 && agree[k] < kMinAgree * kPoints) return false;
     const double weight = faces[k].area_px / kPoints;
     agree_all += weight * agree[k], through_all += weight * through[k], all += faces[k].area_px;
   }
-  WHY("  seen: agree %.0f %.0f %.0f through %.0f %.0f %.0f area %.0f %.0f %.0f; %.0f %.0f of %.0f\n", agree[0], agree[1], agree[2], through[0], through[1], through[2], faces[0].area_px, faces[1].area_px, faces[2].area_px, agree_all, through_all, all);
-  box.score = agree_all - 3 * through_all;
+  const auto count = std::count_if(box.face.begin(), box.face.end(), [](int face) { return face >= 0; });
+  box.score = (agree_all - 3 * through_all) * (1 + kMoreFaces * double(count));
   return through_all <= kMaxThrough * (agree_all + through_all) && agree_all >= kMinAgree * all;
 }
 
@@ -335,62 +336,70 @@ bool BoxFinder::is_claimed(const EdgeField& field, const Candidate& box) {
   return false;
 }
 
-void BoxFinder::find(const EdgeField& field, std::vector<MeasuredBox>& found, double focal_tolerance) {
-  found.clear();
+void BoxFinder::find_candidates(const EdgeField& field) {
   candidates_.clear();
-  regions_.find(field);
-  const size_t count = regions_.regions().size();
-  if (borders_.size() < count) borders_.resize(count);
-  has_border_.assign(count, 0);
   find_pairs();
-  const auto is_pair = [&](int a, int b) {
-    return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& p) {
-      return (p.a == a && p.b == b) || (p.a == b && p.b == a);
-    });
+  const std::vector<PlaneRegion>& all = regions_.regions();
+  const auto meets = [&](int a, int b) {
+    return std::any_of(pairs_.begin(), pairs_.end(),
+                       [&](const Pair& p) { return (p.a == a && p.b == b) || (p.a == b && p.b == a); });
   };
   for (size_t i = 0; i < pairs_.size(); ++i) {
     consider(field, {pairs_[i].a, pairs_[i].b, -1});
     for (size_t j = i + 1; j < pairs_.size(); ++j) {
-      // Three faces: both pairs share one, and the others are at right angles, too.
+      // Three faces: both pairs share one, and the other two are at right angles, too.
       const Pair &p = pairs_[i], &q = pairs_[j];
       const int shared = p.a == q.a || p.a == q.b ? p.a : p.b == q.a || p.b == q.b ? p.b : -1;
       if (shared < 0) continue;
       const int one = p.a + p.b - shared, other = q.a + q.b - shared;
-      if (is_pair(one, other) && shared > std::min(one, other)) continue;  // found from its other pairs, too
-      if (std::abs(dot(regions_.regions()[size_t(one)].plane.normal, regions_.regions()[size_t(other)].plane.normal)) > kRightAngle) continue;
+      if (std::abs(dot(all[size_t(one)].plane.normal, all[size_t(other)].plane.normal)) > kRightAngle) continue;
+      if (meets(one, other) && shared > std::min(one, other)) continue;  // found from two other pairs, too
       consider(field, {shared, one, other});
     }
   }
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < all.size(); ++i) {
     if (has_plane_behind(int(i))) consider(field, {int(i), -1, -1});
   }
   std::sort(candidates_.begin(), candidates_.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+}
+
+MeasuredBox BoxFinder::measured(const Candidate& box, double focal_tolerance) {
+  std::array<size_t, 3> order{0, 1, 2};
+  const auto size = [&](size_t k) { return box.high[k] - box.low[k]; };
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return size(a) > size(b); });
+  MeasuredBox made;
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t k = order[i];
+    made.axis[i] = box.axis[k];
+    made.size_m[i] = size(k);
+    const double across = 1 - box.axis[k].z * box.axis[k].z;  // of the squared length
+    made.size_tolerance_m[i] =
+        std::hypot(2 * std::hypot(box.low_sigma[k], box.high_sigma[k]), size(k) * across * focal_tolerance);
+    made.centre = made.centre + 0.5 * (box.low[k] + box.high[k]) * box.axis[k];
+  }
+  const auto faces = std::count_if(box.face.begin(), box.face.end(), [](int face) { return face >= 0; });
+  made.corners = faces == 1 ? 4 : faces == 2 ? 6 : 7;
+  return made;
+}
+
+void BoxFinder::find(const EdgeField& field, std::vector<MeasuredBox>& found, double focal_tolerance) {
+  found.clear();
+  regions_.find(field);
+  const size_t count = regions_.regions().size();
+  if (borders_.size() < count) borders_.resize(count);
+  has_border_.assign(count, 0);
+  find_candidates(field);
   is_taken_.assign(count, 0);
   claims_.assign((size_t(field.width) / kClaimPx + 1) * (size_t(field.height) / kClaimPx + 1), 0);
   for (const Candidate& box : candidates_) {
-    bool is_free = true;
-    int faces = 0;
-    for (const int face : box.face) is_free = is_free && (face < 0 || !is_taken_[size_t(face)]);
-    if (!is_free || is_claimed(field, box)) continue;
+    if (std::any_of(box.face.begin(), box.face.end(), [&](int face) { return face >= 0 && is_taken_[size_t(face)]; }) ||
+        is_claimed(field, box))
+      continue;
     for (const int face : box.face) {
-      if (face >= 0) is_taken_[size_t(face)] = 1, ++faces;
+      if (face >= 0) is_taken_[size_t(face)] = 1;
     }
-    std::array<size_t, 3> order{0, 1, 2};
-    const auto size = [&](size_t k) { return box.high[k] - box.low[k]; };
-    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return size(a) > size(b); });
-    MeasuredBox made;
-    for (size_t i = 0; i < 3; ++i) {
-      const size_t k = order[i];
-      made.axis[i] = box.axis[k];
-      made.size_m[i] = size(k);
-      const double across = 1 - box.axis[k].z * box.axis[k].z;  // of the squared length
-      made.size_tolerance_m[i] = std::hypot(2 * std::hypot(box.low_sigma[k], box.high_sigma[k]),
-                                            size(k) * across * focal_tolerance);
-      made.centre = made.centre + 0.5 * (box.low[k] + box.high[k]) * box.axis[k];
-    }
-    made.corners = faces == 1 ? 4 : faces == 2 ? 6 : 7;
-    found.push_back(made);
+    found.push_back(measured(box, focal_tolerance));
   }
   std::sort(found.begin(), found.end(), [](const MeasuredBox& a, const MeasuredBox& b) {
     return a.size_m[0] * a.size_m[1] * a.size_m[2] > b.size_m[0] * b.size_m[1] * b.size_m[2];

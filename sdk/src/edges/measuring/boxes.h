@@ -44,12 +44,15 @@ class BoxFinder {
 
   const std::vector<BorderSample>& border_of(const EdgeField& field, int region);
   void find_pairs();
+  void find_candidates(const EdgeField& field);
+  double depth_of(const Candidate& box) const;
+  static MeasuredBox measured(const Candidate& box, double focal_tolerance);
   void consider(const EdgeField& field, std::array<int, 3> faces);
   bool measure(const EdgeField& field, Candidate& box);
   bool measure_sides(const EdgeField& field, Candidate& box);
   bool stands_on_plane(const EdgeField& field, Candidate& box);
   bool has_plane_behind(int region) const;
-  void turn_to_sides(const EdgeField& field, Candidate& box);
+  void turn_to_sides(Candidate& box);
   bool is_seen(const EdgeField& field, Candidate& box) const;
   bool is_claimed(const EdgeField& field, const Candidate& box);
   static SeenFaces faces_to_camera(const Candidate& box, double focal);

@@ -2,12 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#ifdef BOXDEV
-#include <cstdio>
-#define WHY(...) std::fprintf(stderr, __VA_ARGS__)
-#else
-#define WHY(...)
-#endif
 
 namespace maq {
 namespace {
@@ -16,7 +10,7 @@ constexpr int kReachPx = 24;       // pixels of the grid beyond a face in which 
 constexpr int kUnlabelledPx = 5;   // pixels of the grid without a region that are passed on the way
 constexpr int kGapPx = 3;          // of unknown depth, of the grid
 constexpr double kContactR = 2.5;  // footprints between a border and the plane that it touches
-constexpr int kMixedPx = 4;         // pixels between both sides of a jump in depth that may be of neither
+constexpr int kMixedPx = 6;        // pixels between both sides of a jump in depth that may be of neither
 constexpr int kMaxWideningPx = 4;
 constexpr float kMinWideningR = 1;
 constexpr double kMaxContactCosine = 0.3, kMinFall = 0.6;
@@ -26,6 +20,8 @@ constexpr double kMinSeen = 0.35;
 constexpr int kMinSamples = 5;
 constexpr double kMaxScatterR = 2.5;
 constexpr double kMaxSagR = 1, kMaxSagFraction = 0.04, kMaxSideSag = 2.5;  // by which a straight side may seem to bend
+constexpr double kEndSigmaR = 0.1, kScatterSigma = 0.6, kGapSigmaR = 0.3, kWideSigmaR = 0.5;
+constexpr double kPlaneSigma = 0.6;
 constexpr double kMaxTilt = 0.14;  // sine of the angle between a touched plane and a side's direction
 
 double signed_distance(const Plane& plane, Vec3 point) { return dot(plane.normal, point) - plane.offset_m; }
@@ -51,6 +47,11 @@ int widening(const EdgeField& field, int u, int v, int du, int dv, const IsFace&
 }
 
 }  // namespace
+
+double plane_sigma(const PlaneRegions& regions, int region, double focal_px) {
+  const PlaneRegion& face = regions.regions()[size_t(region)];
+  return kEndSigmaR * face.centre.z / focal_px + kPlaneSigma * face.rms_m;
+}
 
 double spacing_on(const Plane& plane, Vec3 point, double focal_px) {
   const double slant = std::abs(dot(plane.normal, normalized(point)));
@@ -84,13 +85,15 @@ void FaceBorder::find(const EdgeField& field, const PlaneRegions& regions, int r
       if (!is_near && step > 1) {  // a pixel that the grid passes over
         for (int k = 0; k < 4 && !is_near; ++k) {
           const int to_u = u + (k == 0 ? -1 : k == 1 ? 1 : 0) * step, to_v = v + (k == 2 ? -1 : k == 3 ? 1 : 0) * step;
-          is_near = to_u >= 0 && to_v >= 0 && to_u < field.width && to_v < field.height && label_at(to_u, to_v) == label;
+          is_near =
+              to_u >= 0 && to_v >= 0 && to_u < field.width && to_v < field.height && label_at(to_u, to_v) == label;
         }
         is_near = is_near && label_at(u, v) == 0;
       }
       if (!is_near) continue;
       const double w = 1 / double(depth);
-      if (std::abs(nearer(u, v, w)) <= face.slack * regions.tolerance(w)) mask_[size_t((v - top) * width + u - left)] = 1;
+      if (std::abs(nearer(u, v, w)) <= face.slack * regions.tolerance(w))
+        mask_[size_t((v - top) * width + u - left)] = 1;
     }
   }
   const auto is_face = [&](int u, int v) {
@@ -140,23 +143,28 @@ void FaceBorder::find(const EdgeField& field, const PlaneRegions& regions, int r
           if (!(depth > 1e-3f && depth < 1e3f)) break;
           const double w = 1 / double(depth);
           const InversePlane& other = regions.regions()[size_t(beyond - 1)].inverse;
-          if (std::abs(w - other.at(x_of(u + (last - 1) * du), y_of(v + (last - 1) * dv))) > regions.regions()[size_t(beyond - 1)].slack * regions.tolerance(w)) break;
+          if (std::abs(w - other.at(x_of(u + (last - 1) * du), y_of(v + (last - 1) * dv))) >
+              regions.regions()[size_t(beyond - 1)].slack * regions.tolerance(w))
+            break;
           --last;
         }
         sample.is_across_gap = unknown > kGapPx * step;
         const double half = beyond != 0 && last <= kMixedPx ? 0.5 * last : 0.5;
-        const int wide = beyond != 0 && at > 0 && !field.distance_r.empty() ? widening(field, u, v, du, dv, is_face) : 0;
+        const int wide =
+            beyond != 0 && at > 0 && !field.distance_r.empty() ? widening(field, u, v, du, dv, is_face) : 0;
         sample.point = point_at(u + (half - wide) * du, v + (half - wide) * dv);
+        sample.widening_px = uint8_t(wide);
         sample.outward = normalized(point_at(u + du, v + dv) - point_at(u, v));
         sample.beyond = uint8_t(beyond);
         if (!(sample.point.z > 0) || !is_finite(sample.point)) continue;
         if (at > 0) {
           const double z = sample.point.z, touch = 3 * regions.error().at(z) + kContactR * z / focal;
           const Plane* other = beyond != 0 ? &regions.regions()[size_t(beyond - 1)].plane : nullptr;
-          const bool touches = other != nullptr && !sample.is_across_gap && std::abs(signed_distance(*other, sample.point)) <= touch;
-          sample.why = touches ? 2 : off >= 0 ? 3 : 4;  // DEV
+          const bool touches =
+              other != nullptr && !sample.is_across_gap && std::abs(signed_distance(*other, sample.point)) <= touch;
           if (touches) {
-            if (std::abs(dot(other->normal, face.plane.normal)) < kMaxContactCosine) sample.kind = BorderSample::Kind::kContact;
+            if (std::abs(dot(other->normal, face.plane.normal)) < kMaxContactCosine)
+              sample.kind = BorderSample::Kind::kContact;
           } else if (off < 0) {
             // A round body turns away slowly.
             const double x = x_of(u + at * du), y = y_of(v + at * dv), depth = 1 / (face.inverse.at(x, y) + off);
@@ -209,16 +217,11 @@ FaceSide SideFinder::find(const PlaneRegions& regions, int region, const std::ve
     if (t < 0.04 || t > 0.96) continue;
     positions_.push_back(position), used_.push_back(&sample);
   }
-#ifdef BOXDEV
-  { int n[3] = {}, b[256] = {}, y[5] = {}; for (auto& q : samples) { if (sign * dot(q.outward, along) < 0.4 || std::abs(dot(q.point, along) - expected) > band) continue; ++n[int(q.kind)]; if (q.kind == BorderSample::Kind::kUnknown) ++y[q.why]; ++b[q.beyond]; } int m = int(std::max_element(b, b + 256) - b);
-  WHY("    side: region %d sign %d free %d contact %d unknown %d, (nothing %d, flat touch %d, nearer %d, slow %d) mostly beyond %d (%d); extent %.3f x %.3f band %.4f\n", region, sign, n[0], n[1], n[2], y[0], y[2], y[3], y[4], m - 1, b[m], extent[1] - extent[0], length, band); }
-#endif
   if (positions_.size() < kMinSamples) return side;
   sorted_ = positions_;
   const double middle = median_of(sorted_);
   for (size_t i = 0; i < sorted_.size(); ++i) sorted_[i] = std::abs(positions_[i] - middle);
   const double scatter = 1.48 * median_of(sorted_);
-  WHY("      scatter %.4f spacing %.4f\n", scatter, spacing);
   if (scatter > kMaxScatterR * spacing + 2 * regions.error().at(face.centre.z)) return side;
   // A round outline falls back towards both ends.
   double parts[2] = {}, counts[2] = {};
@@ -229,27 +232,27 @@ FaceSide SideFinder::find(const PlaneRegions& regions, int region, const std::ve
   }
   const double sag = counts[0] > 0 && counts[1] > 0 ? parts[0] / counts[0] - parts[1] / counts[1] : 0;
   side.sag = sag / std::max(kMaxSagR * spacing + 0.5 * regions.error().at(face.centre.z), kMaxSagFraction * length);
-  WHY("      sag %.2f\n", side.sag);
   if (side.sag > kMaxSideSag) return side;
   const double limit = 2.5 * scatter + 0.7 * spacing;
-  double sum = 0, squares = 0, count = 0, gaps = 0;
+  double sum = 0, squares = 0, count = 0, gaps = 0, wide = 0;
   uint32_t bins = 0;
   std::array<int, 256> votes{};
   for (size_t i = 0; i < positions_.size(); ++i) {
     if (std::abs(positions_[i] - middle) > limit) continue;
     sum += positions_[i] - middle, squares += (positions_[i] - middle) * (positions_[i] - middle), count += 1;
-    gaps += used_[i]->is_across_gap;
+    gaps += used_[i]->is_across_gap, wide += used_[i]->widening_px;
     const double t = (dot(used_[i]->point, across) - extent_across[0]) / length;
     bins |= 1u << std::clamp(int(t * kBins), 0, kBins - 1);
     if (used_[i]->kind == BorderSample::Kind::kContact) ++votes[used_[i]->beyond];
   }
   for (int k = 0; k < kBins; ++k) side.seen += (bins >> k & 1) / double(kBins);
-  WHY("      seen %.2f count %.0f\n", side.seen, count);
   if (side.seen < kMinSeen || count < kMinSamples) return side;
   side.is_known = true;
   side.position_m = middle + sum / count;
   const double deviation = std::sqrt(std::max(0.0, squares / count - (sum / count) * (sum / count)));
-  side.sigma_m = std::hypot(deviation / std::sqrt(count), (0.4 + 0.6 * gaps / count) * spacing);
+  // Neighbouring samples err alike: the scatter does not shrink with their number.
+  side.sigma_m =
+      kEndSigmaR * spacing + kScatterSigma * deviation + (kGapSigmaR * gaps + kWideSigmaR * wide) / count * spacing;
   // The plane that is touched says where the side is better than the border's pixels do.
   const size_t touched = size_t(std::max_element(votes.begin(), votes.end()) - votes.begin());
   if (votes[touched] > 0.5 * count) {
@@ -262,7 +265,7 @@ FaceSide SideFinder::find(const PlaneRegions& regions, int region, const std::ve
       const double shift = -signed_distance(other, at) / slope;
       if (std::abs(shift) <= 3 * spacing + 3 * regions.error().at(at.z)) {
         side.position_m += shift;
-        side.sigma_m = 0.2 * spacing + 0.2 * regions.error().at(at.z);
+        side.sigma_m = plane_sigma(regions, int(touched) - 1, focal_px);
       }
     }
   }

@@ -18,8 +18,8 @@ struct BorderSample {
   Vec3 point;
   Vec3 outward;  // in the face, length 1
   Kind kind = Kind::kUnknown;
-  uint8_t beyond = 0;  // label of the region beyond; 0: none
-  int why = 0;  // DEV
+  uint8_t beyond = 0;          // label of the region beyond; 0: none
+  uint8_t widening_px = 0;     // pixels that the sensor added, already taken off
   bool is_across_gap = false;  // depth is unknown for several pixels before what is beyond
 };
 
@@ -52,6 +52,9 @@ class FaceExtent {
 
 // Returns the distance between neighbouring pixels on a plane at a point.
 double spacing_on(const Plane& plane, Vec3 point, double focal_px);
+
+// The standard deviation of the position of a region's plane.
+double plane_sigma(const PlaneRegions& regions, int region, double focal_px);
 
 // Measures the side of a face towards `sign` * `along`. `extents`: of the region along `along` and `across`.
 class SideFinder {

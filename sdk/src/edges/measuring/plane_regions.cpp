@@ -3,20 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#ifdef BOXDEV
-#include <cstdio>
-#define WHY(...) std::fprintf(stderr, __VA_ARGS__)
-#else
-#define WHY(...)
-#endif
 
 namespace maq {
 namespace {
 
-constexpr int kGridWidth = 400;           // largest width of the grid
+constexpr int kGridWidth = 400;  // largest width of the grid
 constexpr int kSeedRadius = 2, kSeedStride = 3;
 constexpr int kMinRegionPixels = 40;
-constexpr double kTolerances = 3.2;       // standard deviations
+constexpr double kTolerances = 3.2;        // standard deviations
 constexpr double kToleranceFloorR = 0.12;  // and footprints of the grid, on top of them
 constexpr int kDepthBins = 24;
 constexpr double kBinsOfAnOctave = 3;
@@ -24,23 +18,24 @@ constexpr int kContactReach = 4;
 constexpr double kMinJoint = 0.35, kMinJointCosine = 0.98, kMaxJointRms = 0.9, kJointSlack = 2;
 constexpr int kMinOf25 = 11;  // pixels of a square of 25 at the rim of a region that is no thin strip
 constexpr int kMinBinSamples = 30;
+constexpr double kMinStepFraction = 0.15;
 constexpr uint16_t kTooSmall = 65535;  // the stamp of a flood that is no region: none begins there again
 
 }  // namespace
 
-void PlaneSums::add(double at_x, double at_y, double inverse_depth) {
+void InversePlaneSums::add(double at_x, double at_y, double inverse_depth) {
   n += 1, x += at_x, y += at_y, w += inverse_depth;
   xx += at_x * at_x, xy += at_x * at_y, yy += at_y * at_y;
   xw += at_x * inverse_depth, yw += at_y * inverse_depth, ww += inverse_depth * inverse_depth;
 }
 
-void PlaneSums::add(const PlaneSums& other) {
+void InversePlaneSums::add(const InversePlaneSums& other) {
   n += other.n, x += other.x, y += other.y, w += other.w;
   xx += other.xx, xy += other.xy, yy += other.yy;
   xw += other.xw, yw += other.yw, ww += other.ww;
 }
 
-bool fit_inverse_plane(const PlaneSums& sums, InversePlane& plane, double& rms) {
+bool fit_inverse_plane(const InversePlaneSums& sums, InversePlane& plane, double& rms) {
   if (sums.n < 3) return false;
   const double n = sums.n, sxx = sums.xx - sums.x * sums.x / n, syy = sums.yy - sums.y * sums.y / n;
   const double sxy = sums.xy - sums.x * sums.y / n, sxw = sums.xw - sums.x * sums.w / n;
@@ -54,9 +49,10 @@ bool fit_inverse_plane(const PlaneSums& sums, InversePlane& plane, double& rms) 
   return true;
 }
 
-double rms_from(const PlaneSums& s, const InversePlane& p) {
-  const double squares = s.ww + p.a * p.a * s.xx + p.b * p.b * s.yy + p.c * p.c * s.n +
-                         2 * (p.a * p.b * s.xy + p.a * p.c * s.x + p.b * p.c * s.y - p.a * s.xw - p.b * s.yw - p.c * s.w);
+double rms_from(const InversePlaneSums& s, const InversePlane& p) {
+  const double squares =
+      s.ww + p.a * p.a * s.xx + p.b * p.b * s.yy + p.c * p.c * s.n +
+      2 * (p.a * p.b * s.xy + p.a * p.c * s.x + p.b * p.c * s.y - p.a * s.xw - p.b * s.yw - p.c * s.w);
   return std::sqrt(std::max(0.0, squares) / s.n);
 }
 
@@ -86,7 +82,7 @@ void PlaneRegions::read(const EdgeField& field) {
 }
 
 // Returns false if a pixel of the window is unknown or taken.
-bool PlaneRegions::window_sums(int column, int row, PlaneSums& sums) const {
+bool PlaneRegions::window_sums(int column, int row, InversePlaneSums& sums) const {
   for (int j = row - kSeedRadius; j <= row + kSeedRadius; ++j) {
     const size_t at = size_t(j) * size_t(width_);
     for (int i = column - kSeedRadius; i <= column + kSeedRadius; ++i) {
@@ -102,7 +98,7 @@ void PlaneRegions::find_seeds() {
   seeds_.clear();
   for (int j = kSeedRadius; j + kSeedRadius < height_; j += kSeedStride) {
     for (int i = kSeedRadius; i + kSeedRadius < width_; i += kSeedStride) {
-      PlaneSums sums;
+      InversePlaneSums sums;
       InversePlane plane;
       double rms = 0;
       if (!window_sums(i, j, sums) || !fit_inverse_plane(sums, plane, rms)) continue;
@@ -137,7 +133,10 @@ void PlaneRegions::estimate_error() {
       const float w = inverse_[at], bend = std::abs(inverse_[at - 1] - 2 * w + inverse_[at + 1]);
       if (seed.bin == bin && bend > 0) samples_.push_back(bend / (w * w));
     }
-    if (samples_.size() >= kMinBinSamples) steps[size_t(bin)] = quantile(0.2);
+    // Fewer are the edges of things, not steps of depth.
+    if (double(samples_.size()) >= std::max(double(kMinBinSamples), kMinStepFraction * double(counts[size_t(bin)]))) {
+      steps[size_t(bin)] = quantile(0.2);
+    }
   }
   for (int bin = 0; bin < kDepthBins; ++bin) {
     if (counts[size_t(bin)] < kMinBinSamples) continue;
@@ -166,7 +165,7 @@ void PlaneRegions::estimate_error() {
 
 // Floods from a cell. Returns the number of pixels.
 double PlaneRegions::grow(int cell, uint16_t stamp, InversePlane& plane, int& count) {
-  PlaneSums sums;
+  InversePlaneSums sums;
   double rms = 0;
   if (count == 0) {  // the first flood begins with the window around the cell
     window_sums(cell % width_, cell / width_, sums);
@@ -213,6 +212,7 @@ bool PlaneRegions::set_plane(PlaneRegion& region, double& rms) const {
   region.plane = {(-1 / scale) * Vec3{fit.a, fit.b, fit.c}, -1 / scale};
   const double depth = 1 / fit.at(x, y);
   region.centre = {depth * x, depth * y, depth};
+  region.rms_m = rms * depth * depth;
   return true;
 }
 
@@ -252,7 +252,7 @@ void PlaneRegions::find(const EdgeField& field) {
   for (const Seed& seed : seeds_) {
     if (seed.roughness > 1 || int(regions_.size()) >= kMaxRegions || stamp > kTooSmall - 3) break;
     if (labels_[size_t(seed.cell)] != 0 || stamps_[size_t(seed.cell)] == kTooSmall) continue;
-    PlaneSums sums;
+    InversePlaneSums sums;
     if (!window_sums(seed.cell % width_, seed.cell / width_, sums)) continue;
     InversePlane plane;
     int count = 0;
@@ -275,7 +275,8 @@ void PlaneRegions::find(const EdgeField& field) {
     double rms = 0;
     if (region.sums.n == 0) continue;
     if (!set_plane(region, rms)) {
-      for (const int at : queue_) labels_[size_t(at)] = labels_[size_t(at)] == regions_.size() + 1 ? 0 : labels_[size_t(at)];
+      for (const int at : queue_)
+        labels_[size_t(at)] = labels_[size_t(at)] == regions_.size() + 1 ? 0 : labels_[size_t(at)];
       continue;
     }
     regions_.push_back(region);
@@ -326,8 +327,9 @@ void PlaneRegions::join_regions() {
         double rms = 0;
         if (!set_plane(both, rms)) continue;
         const double one_rms = rms_from(one.sums, both.inverse), other_rms = rms_from(other.sums, both.inverse);
-        WHY("joint %zu %zu: contacts %d, %.0f %.0f pixels, cosine %.4f, rms/tolerance %.2f %.2f\n", a, b, contacts, one.sums.n, other.sums.n, dot(one.plane.normal, other.plane.normal), one_rms / tolerance(1 / both.centre.z), other_rms / tolerance(1 / other.centre.z));
-        if (one_rms > kMaxJointRms * tolerance(1 / one.centre.z) || other_rms > kMaxJointRms * tolerance(1 / other.centre.z)) continue;
+        if (one_rms > kMaxJointRms * tolerance(1 / one.centre.z) ||
+            other_rms > kMaxJointRms * tolerance(1 / other.centre.z))
+          continue;
         both.slack = kJointSlack;
         both.left = std::min(one.left, other.left), both.right = std::max(one.right, other.right);
         both.top = std::min(one.top, other.top), both.bottom = std::max(one.bottom, other.bottom);
@@ -371,7 +373,8 @@ double PlaneRegions::roundness(int region) const {
       if (label(column, row) != region + 1) continue;
       const double depth = 1 / double(inverse_[size_t(row) * size_t(width_) + size_t(column)]);
       const Vec3 from = Vec3{depth * double(x_[size_t(column)]), depth * double(y_[size_t(row)]), depth} - face.centre;
-      const double s = scale * dot(from, along), t = scale * dot(from, across), h = scale * dot(from, face.plane.normal);
+      const double s = scale * dot(from, along), t = scale * dot(from, across),
+                   h = scale * dot(from, face.plane.normal);
       const std::array<double, kTerms + 1> terms{1, s, t, s * s, s * t, t * t, h};
       for (size_t i = 0; i < kTerms; ++i) {
         for (size_t j = i; j <= kTerms; ++j) rows[i][j] += terms[i] * terms[j];

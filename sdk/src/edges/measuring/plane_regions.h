@@ -10,10 +10,10 @@
 namespace maq {
 
 // Sums for the plane 1 / z = a x + b y + c, where a pixel's ray is (x, y, 1).
-struct PlaneSums {
+struct InversePlaneSums {
   double n = 0, x = 0, y = 0, w = 0, xx = 0, xy = 0, yy = 0, xw = 0, yw = 0, ww = 0;
 
-  void add(const PlaneSums& other);
+  void add(const InversePlaneSums& other);
   void add(double at_x, double at_y, double inverse_depth);
 };
 
@@ -25,10 +25,10 @@ struct InversePlane {
 
 // Least squares. Returns false if the points lie on a line or are fewer than three. `rms` gets the root mean square
 // residual of inverse depth.
-bool fit_inverse_plane(const PlaneSums& sums, InversePlane& plane, double& rms);
+bool fit_inverse_plane(const InversePlaneSums& sums, InversePlane& plane, double& rms);
 
 // The root mean square residual of inverse depth of points from a plane.
-double rms_from(const PlaneSums& sums, const InversePlane& plane);
+double rms_from(const InversePlaneSums& sums, const InversePlane& plane);
 
 // The standard deviation of depth at a depth: constant_m + square_per_m * depth^2. The first part is that of time of
 // flight, the second that of disparity.
@@ -39,12 +39,13 @@ struct DepthError {
 };
 
 struct PlaneRegion {
-  PlaneSums sums;
+  InversePlaneSums sums;
   InversePlane inverse;
   Plane plane;
-  double slack = 1;  // by which the tolerance of its pixels is multiplied
-  Vec3 centre;     // mean of its points
-  int pixels() const { return int(sums.n); }  // of the grid
+  double rms_m = 0;                              // of its pixels' distances from the plane, along their rays
+  double slack = 1;                              // by which the tolerance of its pixels is multiplied
+  Vec3 centre;                                   // mean of its points
+  int pixels() const { return int(sums.n); }     // of the grid
   int left = 0, top = 0, right = 0, bottom = 0;  // of the grid, inclusive
 };
 
@@ -89,12 +90,12 @@ class PlaneRegions {
   void estimate_error();
   double grow(int cell, uint16_t stamp, InversePlane& plane, int& count);
   bool is_thin(int cell, uint16_t stamp) const;
-  bool window_sums(int column, int row, PlaneSums& sums) const;
+  bool window_sums(int column, int row, InversePlaneSums& sums) const;
 
   int step_ = 1, width_ = 0, height_ = 0;
   double focal_px_ = 1;
-  std::vector<float> inverse_;     // of depth; 0: unknown
-  std::vector<float> x_, y_;       // rays of columns and rows
+  std::vector<float> inverse_;  // of depth; 0: unknown
+  std::vector<float> x_, y_;    // rays of columns and rows
   std::vector<uint8_t> labels_;
   std::vector<uint16_t> stamps_;
   std::vector<int> queue_;

@@ -18,6 +18,7 @@ constexpr double kMarginR = 1.5;                                // footprints at
 constexpr double kMinAgree = 0.5;                               // fraction of its points that depth agrees with
 // Smaller faces, and those seen at a lower sine, are not compared one by one.
 constexpr double kMinFacePx = 40, kMinSlant = 0.3;
+constexpr double kSurrounded = 0.8, kMinSidePx = 60, kMinAgreeSides = 0.6;
 constexpr double kMoreFaces = 0.1;   // by which each further face makes a box better
 constexpr size_t kClaimPx = 4;       // pixels of a cell that a box claims
 constexpr double kMaxClaimed = 0.3;  // fraction of a box that may lie where another is
@@ -220,7 +221,8 @@ bool BoxFinder::stands_on_plane(const EdgeField& field, Candidate& box) {
   const std::vector<PlaneRegion>& all = regions_.regions();
   std::array<int, 256> votes{};
   int free = 0;
-  for (const BorderSample& sample : border_of(field, box.face[0])) {
+  const std::vector<BorderSample>& border = border_of(field, box.face[0]);
+  for (const BorderSample& sample : border) {
     if (sample.kind != BorderSample::Kind::kFree) continue;
     ++free;
     ++votes[sample.beyond];
@@ -228,6 +230,7 @@ bool BoxFinder::stands_on_plane(const EdgeField& field, Candidate& box) {
   votes[0] = 0;
   const size_t most = size_t(std::max_element(votes.begin(), votes.end()) - votes.begin());
   if (votes[most] == 0 || votes[most] < 0.3 * free) return false;
+  box.is_surrounded = votes[most] >= kSurrounded * double(border.size());
   const PlaneRegion &face = all[size_t(box.face[0])], &under = all[most - 1];
   const double slope = dot(under.plane.normal, normalized(box.axis[0]));
   if (slope < kParallel) return false;
@@ -312,6 +315,11 @@ bool BoxFinder::is_seen(const EdgeField& field, Candidate& box) const {
     agree_all += weight * agree[k], through_all += weight * through[k], all += faces[k].area_px;
   }
   const auto count = std::count_if(box.face.begin(), box.face.end(), [](int face) { return face >= 0; });
+  // The plane behind a single face may be far behind its box: one more face must be seen to reach it.
+  if (count == 1 && !box.is_surrounded) {
+    const double sides = all - faces[0].area_px, agree_sides = agree_all - agree[0] * faces[0].area_px / kPoints;
+    if (sides < kMinSidePx || agree_sides < kMinAgreeSides * sides) return false;
+  }
   box.score = (agree_all - 3 * through_all) * (1 + kMoreFaces * double(count));
   return through_all <= kMaxThrough * (agree_all + through_all) && agree_all >= kMinAgree * all;
 }

@@ -31,6 +31,7 @@ class BoxFinder {
     std::array<int, 3> face{-1, -1, -1};
     std::array<Vec3, 3> axis;
     std::array<double, 3> low{}, high{}, low_sigma{}, high_sigma{};
+    bool is_surrounded = false;  // a single face: what it stands on is seen all around it
     double score = 0;
   };
   struct SeenFace {

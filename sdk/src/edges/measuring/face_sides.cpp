@@ -88,7 +88,13 @@ void FaceBorder::find(const EdgeField& field, const PlaneRegions& regions, int r
           is_near =
               to_u >= 0 && to_v >= 0 && to_u < field.width && to_v < field.height && label_at(to_u, to_v) == label;
         }
-        is_near = is_near && label_at(u, v) == 0;
+        const int own =
+            label_at(u, v);  // of the pixel of the grid beside it, which may lie on the other side of an edge
+        if (is_near && own != 0) {
+          const double w = 1 / double(depth);
+          const InversePlane& other = regions.regions()[size_t(own - 1)].inverse;
+          is_near = std::abs(nearer(u, v, w)) < std::abs(w - other.at(x_of(u), y_of(v)));
+        }
       }
       if (!is_near) continue;
       const double w = 1 / double(depth);

@@ -76,7 +76,7 @@ void BoxFinder::consider(const EdgeField& field, std::array<int, 3> faces) {
   candidates_.push_back(box);
 }
 
-// Of its nearest face.
+// Returns the depth of its nearest face.
 double BoxFinder::depth_of(const Candidate& box) const {
   double depth = INFINITY;
   for (const int face : box.face) {
@@ -118,7 +118,7 @@ bool BoxFinder::measure(const EdgeField& field, Candidate& box) {
   return is_seen(field, box);
 }
 
-// Of a single face, the directions in its plane are those of its smallest rectangle.
+// A single face has the directions of its smallest rectangle.
 void BoxFinder::turn_to_sides(Candidate& box) {
   const int face = box.face[0];
   const auto turned = [&](double angle) { return std::cos(angle) * box.axis[1] + std::sin(angle) * box.axis[2]; };

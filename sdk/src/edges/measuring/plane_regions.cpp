@@ -347,7 +347,7 @@ void PlaneRegions::join_regions() {
       }
     }
   }
-  // Those that remain move up.
+  // Regions that remain move up.
   std::array<uint8_t, kMaxRegions + 1> final_label{};
   size_t kept = 0;
   for (size_t k = 0; k < count; ++k) {

@@ -131,7 +131,8 @@ void BoxFinder::turn_to_sides(Candidate& box) {
   };
   constexpr int kSteps = 18;
   for (int k = 0; k < kSteps; ++k) look(k * M_PI / 2 / kSteps);
-  for (double step = M_PI / 4 / kSteps; step > 2e-3; step /= 2) {
+  double step = M_PI / 4 / kSteps;
+  for (int k = 0; k < 5; ++k, step /= 2) {
     const double from = best;
     look(from - step), look(from + step);
   }

@@ -79,9 +79,9 @@ typedef struct maq_edges_corner {
 
 typedef struct maq_edges_box {
   uint32_t struct_size;
-  int32_t corner_count;       /* visible corners, at most 8 */
+  int32_t corner_count;       /* visible corners: 4 of one face, 6 of two, 7 of three */
   double size_m[3];           /* lengths of the sides, the longest first */
-  double size_tolerance_m[3]; /* two standard deviations of each length, from the fit and the spread of its edges and
+  double size_tolerance_m[3]; /* two standard deviations of each length, from the fit and the spread of its ends and
                                  from focal_tolerance */
   double axes[3][3];          /* directions of the sides, length 1, at right angles */
   double centre_m[3];

@@ -139,7 +139,7 @@ FUZZ(edge_field) {
   }
   const EdgeCurves& curves = extractor.extract(field);
   std::vector<MeasuredBox> found;
-  finder.find(field, curves, found);
+  finder.find(field, found);
   write_all(curves);
 }
 

@@ -62,7 +62,7 @@ void CurveFinder::find(const EdgeField& field, const CurveRequest& request, Foun
   found.curves = extractor_.extract(field);
   found.curves_ms = float(stage.lap_ms());
   found.boxes.clear();
-  if (request.finds_boxes) box_finder_.find(field, found.curves, found.boxes, request.focal_tolerance);
+  if (request.finds_boxes) box_finder_.find(field, found.boxes, request.focal_tolerance);
   found.includes_focal_tolerance = request.focal_tolerance > 0;
   found.boxes_ms = request.finds_boxes ? float(stage.lap_ms()) : 0;
   found.seen.width = field.width;

@@ -5,6 +5,11 @@
 
 Codes begin as principal components of the skin's vertices, so they stay nearly linear in where places of the skin lie:
 anchors. At the end codes are whitened (each N(0, 1) over the heads to train on). It resumes from `--out` by itself.
+With `--start` it goes on from a trained prior, with further codes for heads of another source, and keeps those codes
+that move heads most:
+
+    python -m export.heads.train_prior --data .data/heads/points .data/heads/scan-points \
+        --start export/weights/heads-prior.pt --minutes 45
 Writes checkpoint.pt, weights.pt, log.json, curves.png.
 """
 
@@ -42,7 +47,9 @@ HEADS, ON, NEAR, FAR, SLOPES = 8, 384, 448, 96, 128  # a step: heads, and points
 class HeadTensors:
     """The points of heads as arrays of all heads."""
 
-    def __init__(self, heads: list[HeadPoints]) -> None:
+    def __init__(self, heads: list[HeadPoints], first_source: int | None = None) -> None:
+        """first_source: how many of the heads, the first ones, are of the first source; default: all."""
+        self.first_source = len(heads) if first_source is None else first_source
         def stacked(name: str) -> Tensor:
             return torch.from_numpy(np.stack([getattr(h, name) for h in heads]))
 
@@ -50,7 +57,7 @@ class HeadTensors:
         self.colour = stacked("colour")
         self.near, self.near_distance = stacked("near"), stacked("near_distance")
         self.far, self.far_distance = stacked("far"), stacked("far_distance")
-        self.vertices = stacked("vertices")
+        self.vertices, self.visible = stacked("vertices"), stacked("visible")
         self.is_face = torch.from_numpy(is_face(self.template.numpy()))  # of the surface's points
 
     def __len__(self) -> int:
@@ -170,6 +177,37 @@ def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> 
     return float(distance.mean()), float(distance[data.is_face].mean())
 
 
+def fitted_codes_of(visible: Tensor, mean: Tensor, slopes: Tensor, sigma: Tensor) -> Tensor:
+    """Codes [H, K] of heads by their visible vertices [H, V, 3], which are mean [V, 3] + slopes [V, 3, K] codes up to
+    sigma [V]; a priori N(0, 1). Neighbouring vertices say the same: 50 of them count as one."""
+    weight = (1 / sigma.square() / 50).repeat_interleave(3).double()
+    a = slopes.flatten(0, 1).double()
+    off = (visible - mean).flatten(1).double()
+    normal = a.T @ (a * weight[:, None]) + torch.eye(a.shape[1], dtype=torch.float64)
+    return torch.linalg.solve(normal, a.T @ (off * weight).T).T.float()
+
+
+def start_codes(data: HeadTensors, known: Tensor, further: int) -> Tensor:
+    """Codes [H, K + further] to begin with: `known` [N, K] of the first heads; of the others, and all further ones, by
+    what the known codes explain linearly of the visible vertices, and by the principal components of what they leave
+    in the faces."""
+    count, codes = len(known), known.shape[1]
+    visible, z = data.visible, known.double()
+    mean = visible[:count].mean(0)
+    flat = (visible[:count] - mean).flatten(1).double()
+    slopes = torch.linalg.solve(z.T @ z + 4 * torch.eye(codes, dtype=torch.float64), z.T @ flat)
+    left = (flat - z @ slopes).unflatten(1, (-1, 3))
+    sigma = (left.square().sum((0, 2)) / 3 / max(count - codes, 1)).sqrt().clamp(min=0.01).float()
+    slopes = slopes.T.unflatten(0, (-1, 3)).float()
+    z = torch.cat([known, fitted_codes_of(visible[count:], mean, slopes, sigma)])
+    left = data.vertices - mean - torch.einsum("vck,hk->hvc", slopes, z)
+    left = left[:, is_face(data.vertices.mean(0).numpy())]
+    # About 0, not their mean: heads of the first source get further codes of nearly 0.
+    more = principal_codes(torch.cat([left[count:], -left[count:]]), further)[2]
+    projected = torch.einsum("hvc,vck->hk", left, more) / more.square().sum((0, 1))
+    return torch.cat([z, projected], 1)
+
+
 class Training:
     """Everything of a run that its checkpoint holds."""
 
@@ -195,6 +233,27 @@ class Training:
         )
         self.step, self.spent_s = 0, 0.0
         self.log: list[dict] = []
+
+    @torch.no_grad()
+    def start(self, saved: dict, data: HeadTensors) -> None:
+        """Takes the weights of `train`, whose heads are the first ones of `data`, as many as are there, and the start
+        of further codes, which change nothing yet."""
+        known = saved["z"].float()
+        count = min(len(known), data.first_source)
+        old = FieldBases(self.bases.shape, known.shape[1], saved["c"].shape[1])
+        old.load_state_dict(saved["bases"])
+        for own, other in zip(self.bases.constant, old.constant, strict=True):
+            own.copy_(other)
+        for name, other in old.bases.items():
+            self.bases.bases[name].zero_()
+            self.bases.bases[name][: len(other)] = other
+        self.z.copy_(start_codes(data, known[:count], self.bases.shape_codes - known.shape[1]))
+        self.c[:count] = saved["c"][:count].float()
+        self.anchors.mean.copy_(data.vertices.mean(0))
+        codes, flat = self.z - self.z.mean(0), (data.vertices - self.anchors.mean).flatten(1)
+        slopes = torch.linalg.solve(codes.T @ codes + 4 * torch.eye(codes.shape[1]), codes.T @ flat)
+        self.anchors.slopes.copy_(slopes.T.unflatten(0, (-1, 3)))
+        self.anchors.mean.sub_(self.anchors.slopes @ self.z.mean(0))
 
     def state(self) -> dict:
         return {
@@ -230,8 +289,9 @@ class Training:
 
 
 @torch.no_grad()
-def whitened(training: Training) -> tuple[FieldBases, Tensor, Tensor]:
-    """Bases for whitened codes, and the heads' codes z [H, K] and c [H, C]."""
+def whitened(training: Training, data: HeadTensors, shape_codes: int) -> tuple[FieldBases, Tensor, Tensor]:
+    """Bases for whitened codes, of the shape those `shape_codes` that move what is seen of heads most, and the heads'
+    codes z [H, K] and c [H, C]."""
     bases = FieldBases(training.bases.shape, training.bases.shape_codes, training.bases.colour_codes)
     bases.load_state_dict(training.bases.state_dict())
     surface_layer, layers = bases.shape.first_surface_layer, len(bases.constant)
@@ -241,15 +301,22 @@ def whitened(training: Training) -> tuple[FieldBases, Tensor, Tensor]:
         mean = code.mean(0)
         values, vectors = torch.linalg.eigh((code - mean).T @ (code - mean) / len(code))
         deviation = values.clamp(min=1e-12).sqrt()
-        root = vectors * deviation
+        root, white = vectors * deviation, ((code - mean) @ vectors) / deviation
+        if first == 0 and shape_codes < code.shape[1]:
+            response = white.T.float() @ data.visible.flatten(1)
+            turned = torch.linalg.eigh((response @ response.T).double())[1].flip(1)[:, :shape_codes]
+            root, white = root @ turned, white @ turned
         bases.whiten(mean.float(), root.float(), first, last)
-        codes.append((((code - mean) @ vectors) / deviation).float())
+        codes.append(white.float())
+    bases.shape_codes = codes[0].shape[1]
     return bases, codes[0], codes[1]
 
 
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
+    parser.add_argument("--data", type=Path, nargs="+", default=[Path(".data/heads/points")], help="one a source")
+    parser.add_argument("--start", type=Path, help="weights.pt of a prior to go on from, trained on the first source")
+    parser.add_argument("--further-codes", type=int, default=32, help="with --start: more codes while it trains")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-prior"))
     parser.add_argument("--width", type=int, default=64, help="of geometry and surface layers")
     parser.add_argument("--codes", type=int, default=64, help="shape codes of a head")
@@ -268,14 +335,19 @@ def train(arguments: argparse.Namespace) -> None:
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)
-    data, held_out = HeadTensors(read_points(arguments.data, "train")), HeadTensors(read_points(arguments.data, "val"))
+    sources = [read_points(folder, "train") for folder in arguments.data]
+    data = HeadTensors([head for source in sources for head in source], len(sources[0]))
+    held_out = HeadTensors([head for folder in arguments.data for head in read_points(folder, "val")])
     print(f"{len(data)} heads to train on, {len(held_out)} held out", flush=True)
     shape = FieldShape(octaves=arguments.octaves, width=arguments.width, surface_width=arguments.width)
-    training = Training(shape, data, arguments.rate, arguments.codes)
+    further = arguments.further_codes if arguments.start else 0
+    training = Training(shape, data, arguments.rate, arguments.codes + further)
     path = arguments.out / "checkpoint.pt"
     arguments.out.mkdir(parents=True, exist_ok=True)
     if path.exists():
         training.load(torch.load(path, weights_only=True))
+    elif arguments.start:
+        training.start(torch.load(arguments.start, weights_only=True), data)
     schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
     clock, smoothed = Stopwatch(training.spent_s), SmoothedTerms()
     save, validate = Interval(SAVE_EVERY_S), Interval(arguments.validate_minutes * 60)
@@ -283,7 +355,7 @@ def train(arguments: argparse.Namespace) -> None:
 
     def validated() -> None:
         begun = time.monotonic()
-        bases, *_ = whitened(training)
+        bases, *_ = whitened(training, data, arguments.codes)
         metrics = asdict(fit_metrics(bases, held_out, *fitted_codes(bases, held_out)))
         row = {"step": training.step, "spent": training.spent_s} | metrics
         training.log.append(row)
@@ -310,7 +382,7 @@ def train(arguments: argparse.Namespace) -> None:
             clock.skip()
     save_atomically(training.state(), path)
     validated()
-    bases, z, c = whitened(training)
+    bases, z, c = whitened(training, data, arguments.codes)
     held_out_z, _ = fitted_codes(bases, held_out)
     save_atomically(
         {"shape": asdict(shape), "bases": bases.state_dict(), "z": z, "c": c, "held_out_z": held_out_z},

@@ -26,7 +26,7 @@ from benchmarks.heads.photos import Photo, PhotoBackgrounds, TrueHead, generator
 from benchmarks.heads.quality import BACKGROUNDS, BUNDLE
 from benchmarks.heads.tables import table
 from export.heads.head_shards import is_face, read_pictures
-from export.heads.scanned_heads import similarity
+from export.heads.scans.scanned_heads import similarity
 
 GROUP = 8
 MM_PER_M = 1000

@@ -1,10 +1,10 @@
-"""Makes test heads from scans: people of a linear model (`export.heads.scanned_heads`), some smiling, half of them bald.
+"""Makes test heads from scans: people of a linear model (`export.heads.scans`), some smiling, half of them bald.
 
     python -m benchmarks.heads.scanned_people --scans .data/heads/scans.npz --out .data/heads/scanned
 
 Every head has components of identity that no training sees, at twice their size, and those that trainings see, in other
 mixtures. Images show the source's own surface with hair, skin tones and light of synthetic heads, one from the front
-and one from 30 degrees. Beside them: the points of the surface that cameras see, their template points, the pupils.
+and one from 30 degrees. Beside them: the points of the surface that cameras see, and the pupils.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from export.heads.head_shards import HeadImages, is_face
 from export.heads.sampling import look_at, sample_camera, sample_lamps
-from export.heads.scanned_heads import EYES, SKIN_VERTICES, ScannedHeads, read_scanned_heads, sample_coefficients
+from export.heads.scans.scanned_heads import EYES, SKIN_VERTICES, ScannedHeads, read_scanned_heads, sample_coefficients
 from export.heads.shapes import vertex_normals
 from export.heads.surface import HAIR, Head, HeadMaker, Place, barycentric, cut_distance
 from export.heads.synthetic_heads import make_maker
@@ -35,8 +35,7 @@ SIZE_DM = 4.0  # side of the square around a head that `seen_points` looks at
 
 @dataclass(frozen=True, eq=False)
 class ScannedPerson:
-    """A head ready to be seen. pupils [2, 3]: fronts of the eyeballs; front [N, 3]: the template's vertices of the face,
-    brought onto this head; dm."""
+    """A head ready to be seen. pupils [2, 3]: fronts of the eyeballs; front [N, 3]: template vertices of its face; dm."""
 
     scene: Scene
     pupils: np.ndarray
@@ -119,15 +118,12 @@ def main() -> None:
         person = make_person(scans, maker, number)
         rng = np.random.default_rng([zlib.crc32(b"images of scanned people"), number])
         surface, template = seen_points(person.scene, rng)
-        rows = [
-            image_row(person.scene.seen(sample_camera(surface, rng, yaw), sample_lamps(rng))) for yaw in YAWS
-        ]
+        rows = [image_row(person.scene.seen(sample_camera(surface, rng, yaw), sample_lamps(rng))) for yaw in YAWS]
         pictures = HeadImages(*(np.stack(column) for column in zip(*rows, strict=True)))
         columns = {f.name: getattr(pictures, f.name) for f in fields(pictures)}
         np.savez(
             arguments.out / f"scanned-{number:02}.npz", surface=surface.astype(np.float32),
-            surface_template=template.astype(np.float32), face=is_face(template), pupils=person.pupils, front=person.front,
-            **columns,
+            face=is_face(template), pupils=person.pupils, front=person.front, **columns,
         )  # fmt: skip
 
 

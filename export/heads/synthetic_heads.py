@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from export.heads.head_shards import SPLITS, HeadImages, HeadPoints, head_path
-from export.heads.scanned_heads import ScannedHeads, read_scanned_heads, sample_scanned
+from export.heads.scans.scanned_heads import ScannedHeads, read_scanned_heads, sample_scanned
 from export.heads.shapes import HeadShapes
 from export.heads.surface import Head, HeadMaker
 from export.people import assets
@@ -51,7 +51,7 @@ def shard_parser(description: str, out: Path) -> argparse.ArgumentParser:
     parser.add_argument("--count", type=int, default=600, help="heads")
     parser.add_argument("--first", type=int, default=0, help="number of the first head")
     parser.add_argument("--out", type=Path, default=out)
-    parser.add_argument("--scans", type=Path, help="shapes of `export.heads.scan_registration` instead of MakeHuman's")
+    parser.add_argument("--scans", type=Path, help="shapes of `export.heads.scans.registration` instead of MakeHuman's")
     return parser
 
 

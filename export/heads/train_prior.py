@@ -27,6 +27,7 @@ from torch import Tensor, nn
 from export.heads.field import FieldBases, geometry, surface
 from export.heads.head_shards import HeadPoints, is_face, read_points
 from export.heads.prior import FieldShape
+from export.heads.prior_start import linear_slopes, principal_codes, start_codes
 from export.training import (
     SAVE_EVERY_S,
     Interval,
@@ -50,6 +51,7 @@ class HeadTensors:
     def __init__(self, heads: list[HeadPoints], first_source: int | None = None) -> None:
         """first_source: how many of the heads, the first ones, are of the first source; default: all."""
         self.first_source = len(heads) if first_source is None else first_source
+
         def stacked(name: str) -> Tensor:
             return torch.from_numpy(np.stack([getattr(h, name) for h in heads]))
 
@@ -113,16 +115,6 @@ class Anchors(nn.Module):
         self.mean, self.slopes = nn.Parameter(mean), nn.Parameter(slopes)  # [M, 3], [M, 3, K]
 
 
-def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Whitened principal components of heads [H, V, 3]: codes [H, count], mean [V, 3], slopes [V, 3, count]."""
-    flat = vertices.reshape(len(vertices), -1).double()
-    mean = flat.mean(0)
-    u, s, v = torch.linalg.svd(flat - mean, full_matrices=False)
-    root = len(flat) ** 0.5
-    codes, slopes = u[:, :count] * root, (s[:count, None] * v[:count] / root).T
-    return codes.float(), mean.reshape(-1, 3).float(), slopes.reshape(-1, 3, count).float()
-
-
 @dataclass(frozen=True)
 class FitMetrics:
     """Mean distance of true points to the fitted surface, mm, of heads whose codes were fitted to their true points."""
@@ -177,37 +169,6 @@ def _distance_mm(bases: FieldBases, data: HeadTensors, z: Tensor, c: Tensor) -> 
     return float(distance.mean()), float(distance[data.is_face].mean())
 
 
-def fitted_codes_of(visible: Tensor, mean: Tensor, slopes: Tensor, sigma: Tensor) -> Tensor:
-    """Codes [H, K] of heads by their visible vertices [H, V, 3], which are mean [V, 3] + slopes [V, 3, K] codes up to
-    sigma [V]; a priori N(0, 1). Neighbouring vertices say the same: 50 of them count as one."""
-    weight = (1 / sigma.square() / 50).repeat_interleave(3).double()
-    a = slopes.flatten(0, 1).double()
-    off = (visible - mean).flatten(1).double()
-    normal = a.T @ (a * weight[:, None]) + torch.eye(a.shape[1], dtype=torch.float64)
-    return torch.linalg.solve(normal, a.T @ (off * weight).T).T.float()
-
-
-def start_codes(data: HeadTensors, known: Tensor, further: int) -> Tensor:
-    """Codes [H, K + further] to begin with: `known` [N, K] of the first heads; of the others, and all further ones, by
-    what the known codes explain linearly of the visible vertices, and by the principal components of what they leave
-    in the faces."""
-    count, codes = len(known), known.shape[1]
-    visible, z = data.visible, known.double()
-    mean = visible[:count].mean(0)
-    flat = (visible[:count] - mean).flatten(1).double()
-    slopes = torch.linalg.solve(z.T @ z + 4 * torch.eye(codes, dtype=torch.float64), z.T @ flat)
-    left = (flat - z @ slopes).unflatten(1, (-1, 3))
-    sigma = (left.square().sum((0, 2)) / 3 / max(count - codes, 1)).sqrt().clamp(min=0.01).float()
-    slopes = slopes.T.unflatten(0, (-1, 3)).float()
-    z = torch.cat([known, fitted_codes_of(visible[count:], mean, slopes, sigma)])
-    left = data.vertices - mean - torch.einsum("vck,hk->hvc", slopes, z)
-    left = left[:, is_face(data.vertices.mean(0).numpy())]
-    # About 0, not their mean: heads of the first source get further codes of nearly 0.
-    more = principal_codes(torch.cat([left[count:], -left[count:]]), further)[2]
-    projected = torch.einsum("hvc,vck->hk", left, more) / more.square().sum((0, 1))
-    return torch.cat([z, projected], 1)
-
-
 class Training:
     """Everything of a run that its checkpoint holds."""
 
@@ -247,13 +208,12 @@ class Training:
         for name, other in old.bases.items():
             self.bases.bases[name].zero_()
             self.bases.bases[name][: len(other)] = other
-        self.z.copy_(start_codes(data, known[:count], self.bases.shape_codes - known.shape[1]))
+        further = self.bases.shape_codes - known.shape[1]
+        self.z.copy_(start_codes(data.vertices, data.visible, known[:count], further))
         self.c[:count] = saved["c"][:count].float()
-        self.anchors.mean.copy_(data.vertices.mean(0))
-        codes, flat = self.z - self.z.mean(0), (data.vertices - self.anchors.mean).flatten(1)
-        slopes = torch.linalg.solve(codes.T @ codes + 4 * torch.eye(codes.shape[1]), codes.T @ flat)
-        self.anchors.slopes.copy_(slopes.T.unflatten(0, (-1, 3)))
-        self.anchors.mean.sub_(self.anchors.slopes @ self.z.mean(0))
+        mean, slopes = linear_slopes(self.z, data.vertices)
+        self.anchors.mean.copy_(mean)
+        self.anchors.slopes.copy_(slopes)
 
     def state(self) -> dict:
         return {

@@ -2,7 +2,8 @@
 
     python -m export.heads.encoder_training.pack heads.pack --heads 3000 --scans .data/heads/scans.npz
 
-Half of the heads are of the scans where these are given. Heads are kept as weights of the principal shapes among them, which loses what is printed; photographs as JPEG.
+Half of the heads are of the scans where these are given. Heads are kept as weights of the principal shapes among them,
+which loses what is printed; photographs as JPEG.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from tqdm import tqdm
 
 from export.heads.encoder_training.packed import jpegs
 from export.heads.photos.faces import PhotoFaces, read_photos
-from export.heads.scanned_heads import ScannedHeads, read_scanned_heads, sample_scanned
+from export.heads.scans.scanned_heads import ScannedHeads, read_scanned_heads, sample_scanned
 from export.heads.shapes import HeadShapes
 from export.heads.surface import HeadMaker
 from export.heads.synthetic_heads import ADULT, generator, make_maker
@@ -123,7 +124,7 @@ def main() -> None:
     parser.add_argument("--bases", type=int, default=240)
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds/train"))
     parser.add_argument("--photos", type=Path, default=Path(".data/heads/photos"))
-    parser.add_argument("--scans", type=Path, help="of `export.heads.scanned_heads`")
+    parser.add_argument("--scans", type=Path, help="of `export.heads.scans.scanned_heads`")
     options = parser.parse_args()
     maker = make_maker()
     scans = read_scanned_heads(options.scans) if options.scans else None

@@ -1,6 +1,6 @@
 """Brings a linear model of scanned heads into the vertices of `HeadShapes`.
 
-    python -m export.heads.scan_registration ict_facekit_light.npz --out .data/heads/scans.npz
+    python -m export.heads.scans.registration ict_facekit_light.npz --out .data/heads/scans.npz
 
 The source is ICT-FaceKit (MIT): a mean face, components of identity and expressions in one mesh. Its mean face is
 registered to the template head once: the template is bent until it lies on that face, with the landmarks of both in the
@@ -20,7 +20,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu, spsolve
 
 from export.heads.photos.face_points import read_face_points
-from export.heads.scanned_heads import EYES, SKIN_VERTICES, ScannedHeads
+from export.heads.scans.scanned_heads import EYES, SKIN_VERTICES, ScannedHeads
 from export.heads.shapes import HeadShapes, vertex_normals
 from export.heads.surface import HeadMaker, barycentric
 from export.heads.synthetic_heads import make_maker

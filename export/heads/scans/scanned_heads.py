@@ -1,6 +1,6 @@
 """Heads of a linear model of scanned people, in the vertices of `HeadShapes`: shapes that MakeHuman does not have.
 
-`export.heads.scan_registration` makes the file from its source.
+`export.heads.scans.registration` makes the file from its source.
 """
 
 from __future__ import annotations
@@ -71,7 +71,6 @@ class ScannedHeads:
                 for side in "LR":
                     out[names.index(f"{name}_{side}")] = size * rng.uniform(0.7, 1)
         return out
-
 
 
 def sample_coefficients(count: int, rng: np.random.Generator, held_out: bool) -> np.ndarray:

@@ -42,7 +42,8 @@ def test_the_template_is_bent_onto_another_head(maker, monkeypatch):
     off = np.linalg.norm(bent[used] - true[used], axis=1) * 100
     before = np.linalg.norm(template[used] - true[used], axis=1) * 100
     assert np.median(before) > 3
-    assert np.median(off) < 0.2 * np.median(before) and np.percentile(off, 95) < 4
+    assert np.median(off) < 0.2 * np.median(before)
+    assert np.percentile(off, 95) < 4
     _, away = registration.places_on(bent[used], true, maker.faces)
     assert np.median(away) * 100 < 0.05
 
@@ -63,7 +64,8 @@ def test_trainings_do_not_see_components_that_tests_have():
     rng = np.random.default_rng(0)
     train = np.stack([sample_coefficients(50, rng, held_out=False) for _ in range(200)])
     test = np.stack([sample_coefficients(50, rng, held_out=True) for _ in range(200)])
-    assert (train[:, HELD_OUT] == 0).all() and len(train[0, HELD_OUT]) == 10
+    assert (train[:, HELD_OUT] == 0).all()
+    assert len(train[0, HELD_OUT]) == 10
     assert test[:, HELD_OUT].std() == pytest.approx(2, abs=0.15)
     assert np.delete(test, np.arange(50)[HELD_OUT], 1).std() == pytest.approx(1, abs=0.05)
 
@@ -75,7 +77,8 @@ def test_expressions_are_apart_from_identity_and_both_sides_smile():
         nothing, np.zeros((2, 1, 3)), np.zeros((len(names), 1, 3)), names, nothing, nothing, nothing, nothing, nothing
     )
     smile = dict(zip(names, heads.sample_expression(np.random.default_rng(1), smiles=True), strict=True))
-    assert smile["mouthSmile_L"] >= 0.34 and smile["mouthSmile_R"] >= 0.34
+    assert smile["mouthSmile_L"] >= 0.34
+    assert smile["mouthSmile_R"] >= 0.34
     quiet = dict(zip(names, heads.sample_expression(np.random.default_rng(1), smiles=False), strict=True))
     assert quiet["mouthSmile_L"] == quiet["mouthSmile_R"] == 0
     assert 0 < sum(value > 0 for value in quiet.values()) <= 4

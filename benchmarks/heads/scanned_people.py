@@ -35,7 +35,7 @@ SIZE_DM = 4.0  # side of the square around a head that `seen_points` looks at
 
 @dataclass(frozen=True, eq=False)
 class ScannedPerson:
-    """A head ready to be seen, dm. pupils [2, 3]: fronts of the eyeballs; front [N, 3]: the face in template vertices."""
+    """A head ready to be seen, dm. pupils [2, 3]: fronts of the eyeballs; front [N, 3]: vertices of the face."""
 
     scene: Scene
     pupils: np.ndarray

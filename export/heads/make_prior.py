@@ -117,11 +117,11 @@ def make_prior(saved: dict, maker: HeadMaker, visible: np.ndarray) -> Prior:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--weights", type=Path, default=Path(".data/runs/heads-prior/weights.pt"))
-    parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
+    parser.add_argument("--data", type=Path, nargs="+", default=[Path(".data/heads/points")], help="one a source")
     parser.add_argument("--out", type=Path, default=Path(".data/heads/prior.maqp"))
     parser.add_argument("--bases", choices=("int8", "float16", "float32"), default="int8")
     arguments = parser.parse_args()
-    visible = np.stack([head.visible for head in read_points(arguments.data, "train")])
+    visible = np.stack([head.visible for folder in arguments.data for head in read_points(folder, "train")])
     prior = make_prior(torch.load(arguments.weights, weights_only=True), make_maker(), visible)
     write_prior(prior, arguments.out, arguments.bases)
     print(

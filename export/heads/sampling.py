@@ -98,10 +98,12 @@ def look_at(
     return Camera.centred(side_px, side_px, focal_px, rotation, aim + distance * outward)
 
 
-def sample_camera(points: np.ndarray, rng: np.random.Generator) -> Camera:
-    """Mostly of faces from the front and sides, from 35 cm to 3 m; the image is a square around a head's points."""
+def sample_camera(points: np.ndarray, rng: np.random.Generator, yaw: float | None = None) -> Camera:
+    """Mostly of faces from the front and sides, from 35 cm to 3 m; the image is a square around a head's points. yaw:
+    from where the camera looks, radians; None: from anywhere."""
     u = rng.random()
-    yaw = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
+    sampled = rng.normal(0, 0.45) if u < 0.55 else rng.uniform(-1.9, 1.9) if u < 0.88 else rng.uniform(-np.pi, np.pi)
+    yaw = sampled if yaw is None else yaw
     pitch, roll = np.clip(rng.normal(0, 0.22), -0.8, 0.8), np.clip(rng.normal(0, 0.22), -0.9, 0.9)
     distance = float(np.exp(rng.uniform(np.log(3.5), np.log(30))))
     camera = look_at(yaw, pitch, roll, distance, np.zeros(3), 100.0, SIDE)

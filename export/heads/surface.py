@@ -158,7 +158,7 @@ class Head:
         """The places nearest to points [N, 3], and how far they are, dm [N]."""
         squared, face, at = igl.point_mesh_squared_distance(points, self.positions, self.faces)
         corner = self.positions[self.faces[face]]
-        return Place(face, _barycentric(at, corner)), np.sqrt(np.maximum(squared, 0))
+        return Place(face, barycentric(at, corner)), np.sqrt(np.maximum(squared, 0))
 
     def is_inside(self, points: np.ndarray) -> np.ndarray:
         """Which of [N, 3] lie inside of any part (generalized winding number)."""
@@ -246,7 +246,7 @@ class Head:
         return Place(face, np.stack([1 - a, a * (1 - b), a * b], 1))
 
 
-def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Barycentric coordinates [N, 3] of points [N, 3] in the planes of triangles [N, 3, 3]."""
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = points - corners[:, 0]

@@ -5,6 +5,11 @@
 
 Codes begin as principal components of the skin's vertices, so they stay nearly linear in where places of the skin lie:
 anchors. At the end codes are whitened (each N(0, 1) over the heads to train on). It resumes from `--out` by itself.
+With `--start` it goes on from a trained prior, with further codes for heads of another source, and keeps those codes
+that move heads most:
+
+    python -m export.heads.train_prior --data .data/heads/points .data/heads/scan-points \
+        --start export/weights/heads-prior.pt --minutes 45
 Writes checkpoint.pt, weights.pt, log.json, curves.png.
 """
 
@@ -22,6 +27,7 @@ from torch import Tensor, nn
 from export.heads.field import FieldBases, geometry, surface
 from export.heads.head_shards import HeadPoints, is_face, read_points
 from export.heads.prior import FieldShape
+from export.heads.prior_start import linear_slopes, principal_codes, start_codes
 from export.training import (
     SAVE_EVERY_S,
     Interval,
@@ -42,7 +48,10 @@ HEADS, ON, NEAR, FAR, SLOPES = 8, 384, 448, 96, 128  # a step: heads, and points
 class HeadTensors:
     """The points of heads as arrays of all heads."""
 
-    def __init__(self, heads: list[HeadPoints]) -> None:
+    def __init__(self, heads: list[HeadPoints], first_source: int | None = None) -> None:
+        """first_source: how many of the heads, the first ones, are of the first source; default: all."""
+        self.first_source = len(heads) if first_source is None else first_source
+
         def stacked(name: str) -> Tensor:
             return torch.from_numpy(np.stack([getattr(h, name) for h in heads]))
 
@@ -50,7 +59,7 @@ class HeadTensors:
         self.colour = stacked("colour")
         self.near, self.near_distance = stacked("near"), stacked("near_distance")
         self.far, self.far_distance = stacked("far"), stacked("far_distance")
-        self.vertices = stacked("vertices")
+        self.vertices, self.visible = stacked("vertices"), stacked("visible")
         self.is_face = torch.from_numpy(is_face(self.template.numpy()))  # of the surface's points
 
     def __len__(self) -> int:
@@ -104,16 +113,6 @@ class Anchors(nn.Module):
     def __init__(self, mean: Tensor, slopes: Tensor) -> None:
         super().__init__()
         self.mean, self.slopes = nn.Parameter(mean), nn.Parameter(slopes)  # [M, 3], [M, 3, K]
-
-
-def principal_codes(vertices: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Whitened principal components of heads [H, V, 3]: codes [H, count], mean [V, 3], slopes [V, 3, count]."""
-    flat = vertices.reshape(len(vertices), -1).double()
-    mean = flat.mean(0)
-    u, s, v = torch.linalg.svd(flat - mean, full_matrices=False)
-    root = len(flat) ** 0.5
-    codes, slopes = u[:, :count] * root, (s[:count, None] * v[:count] / root).T
-    return codes.float(), mean.reshape(-1, 3).float(), slopes.reshape(-1, 3, count).float()
 
 
 @dataclass(frozen=True)
@@ -196,6 +195,26 @@ class Training:
         self.step, self.spent_s = 0, 0.0
         self.log: list[dict] = []
 
+    @torch.no_grad()
+    def start(self, saved: dict, data: HeadTensors) -> None:
+        """Takes the weights of `train`, whose heads are the first ones of `data`, as many as are there, and the start
+        of further codes, which change nothing yet."""
+        known = saved["z"].float()
+        count = min(len(known), data.first_source)
+        old = FieldBases(self.bases.shape, known.shape[1], saved["c"].shape[1])
+        old.load_state_dict(saved["bases"])
+        for own, other in zip(self.bases.constant, old.constant, strict=True):
+            own.copy_(other)
+        for name, other in old.bases.items():
+            self.bases.bases[name].zero_()
+            self.bases.bases[name][: len(other)] = other
+        further = self.bases.shape_codes - known.shape[1]
+        self.z.copy_(start_codes(data.vertices, data.visible, known[:count], further))
+        self.c[:count] = saved["c"][:count].float()
+        mean, slopes = linear_slopes(self.z, data.vertices)
+        self.anchors.mean.copy_(mean)
+        self.anchors.slopes.copy_(slopes)
+
     def state(self) -> dict:
         return {
             "shape": asdict(self.bases.shape), "bases": self.bases.state_dict(), "z": self.z.data, "c": self.c.data,
@@ -230,8 +249,9 @@ class Training:
 
 
 @torch.no_grad()
-def whitened(training: Training) -> tuple[FieldBases, Tensor, Tensor]:
-    """Bases for whitened codes, and the heads' codes z [H, K] and c [H, C]."""
+def whitened(training: Training, data: HeadTensors, shape_codes: int) -> tuple[FieldBases, Tensor, Tensor]:
+    """Bases for whitened codes, of the shape those `shape_codes` that move what is seen of heads most, and the heads'
+    codes z [H, K] and c [H, C]."""
     bases = FieldBases(training.bases.shape, training.bases.shape_codes, training.bases.colour_codes)
     bases.load_state_dict(training.bases.state_dict())
     surface_layer, layers = bases.shape.first_surface_layer, len(bases.constant)
@@ -241,15 +261,22 @@ def whitened(training: Training) -> tuple[FieldBases, Tensor, Tensor]:
         mean = code.mean(0)
         values, vectors = torch.linalg.eigh((code - mean).T @ (code - mean) / len(code))
         deviation = values.clamp(min=1e-12).sqrt()
-        root = vectors * deviation
+        root, white = vectors * deviation, ((code - mean) @ vectors) / deviation
+        if first == 0 and shape_codes < code.shape[1]:
+            response = white.T.float() @ data.visible.flatten(1)
+            turned = torch.linalg.eigh((response @ response.T).double())[1].flip(1)[:, :shape_codes]
+            root, white = root @ turned, white @ turned
         bases.whiten(mean.float(), root.float(), first, last)
-        codes.append((((code - mean) @ vectors) / deviation).float())
+        codes.append(white.float())
+    bases.shape_codes = codes[0].shape[1]
     return bases, codes[0], codes[1]
 
 
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", type=Path, default=Path(".data/heads/points"))
+    parser.add_argument("--data", type=Path, nargs="+", default=[Path(".data/heads/points")], help="one a source")
+    parser.add_argument("--start", type=Path, help="weights.pt of a prior to go on from, trained on the first source")
+    parser.add_argument("--further-codes", type=int, default=32, help="with --start: more codes while it trains")
     parser.add_argument("--out", type=Path, default=Path(".data/runs/heads-prior"))
     parser.add_argument("--width", type=int, default=64, help="of geometry and surface layers")
     parser.add_argument("--codes", type=int, default=64, help="shape codes of a head")
@@ -268,14 +295,19 @@ def train(arguments: argparse.Namespace) -> None:
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)
-    data, held_out = HeadTensors(read_points(arguments.data, "train")), HeadTensors(read_points(arguments.data, "val"))
+    sources = [read_points(folder, "train") for folder in arguments.data]
+    data = HeadTensors([head for source in sources for head in source], len(sources[0]))
+    held_out = HeadTensors([head for folder in arguments.data for head in read_points(folder, "val")])
     print(f"{len(data)} heads to train on, {len(held_out)} held out", flush=True)
     shape = FieldShape(octaves=arguments.octaves, width=arguments.width, surface_width=arguments.width)
-    training = Training(shape, data, arguments.rate, arguments.codes)
+    further = arguments.further_codes if arguments.start else 0
+    training = Training(shape, data, arguments.rate, arguments.codes + further)
     path = arguments.out / "checkpoint.pt"
     arguments.out.mkdir(parents=True, exist_ok=True)
     if path.exists():
         training.load(torch.load(path, weights_only=True))
+    elif arguments.start:
+        training.start(torch.load(arguments.start, weights_only=True), data)
     schedule, stop = Schedule(arguments.minutes, arguments.steps), StopSignal()
     clock, smoothed = Stopwatch(training.spent_s), SmoothedTerms()
     save, validate = Interval(SAVE_EVERY_S), Interval(arguments.validate_minutes * 60)
@@ -283,7 +315,7 @@ def train(arguments: argparse.Namespace) -> None:
 
     def validated() -> None:
         begun = time.monotonic()
-        bases, *_ = whitened(training)
+        bases, *_ = whitened(training, data, arguments.codes)
         metrics = asdict(fit_metrics(bases, held_out, *fitted_codes(bases, held_out)))
         row = {"step": training.step, "spent": training.spent_s} | metrics
         training.log.append(row)
@@ -310,7 +342,7 @@ def train(arguments: argparse.Namespace) -> None:
             clock.skip()
     save_atomically(training.state(), path)
     validated()
-    bases, z, c = whitened(training)
+    bases, z, c = whitened(training, data, arguments.codes)
     held_out_z, _ = fitted_codes(bases, held_out)
     save_atomically(
         {"shape": asdict(shape), "bases": bases.state_dict(), "z": z, "c": c, "held_out_z": held_out_z},

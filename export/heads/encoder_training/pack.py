@@ -1,8 +1,9 @@
 """One file with all that training the encoder on another machine takes: heads, skin, backgrounds, real faces.
 
-    python -m export.heads.encoder_training.pack heads.pack --heads 3000
+    python -m export.heads.encoder_training.pack heads.pack --heads 3000 --scans .data/heads/scans.npz
 
-Heads are kept as weights of the principal shapes among them, which loses what is printed; photographs as JPEG.
+Half of the heads are of the scans where these are given. Heads are kept as weights of the principal shapes among them,
+which loses what is printed; photographs as JPEG.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from tqdm import tqdm
 
 from export.heads.encoder_training.packed import jpegs
 from export.heads.photos.faces import PhotoFaces, read_photos
+from export.heads.scans.scanned_heads import ScannedHeads, read_scanned_heads, sample_scanned
 from export.heads.shapes import HeadShapes
 from export.heads.surface import HeadMaker
-from export.heads.synthetic_heads import generator, make_maker
+from export.heads.synthetic_heads import ADULT, generator, make_maker
 from export.people.imaging import motion_kernel
 
 BACKGROUND_PX = 256
@@ -36,14 +38,22 @@ def squares(image: np.ndarray) -> list[np.ndarray]:
     return [cv2.resize(part, size, interpolation=cv2.INTER_AREA) for part in parts]
 
 
-def packed_heads(maker: HeadMaker, count: int, bases: int) -> tuple[dict[str, np.ndarray], str]:
-    """The arrays of `PackedHeads`, bases in int8, of the first heads of the training split; and what they lose."""
+def packed_heads(
+    maker: HeadMaker, count: int, bases: int, scans: ScannedHeads | None = None
+) -> tuple[dict[str, np.ndarray], str]:
+    """The arrays of `PackedHeads`, bases in int8, of the first heads of the training split; and what they lose. scans:
+    of these is every second head."""
     shapes = maker.shapes
     rows, people = [], []
     for number in tqdm(range(count), unit="head", disable=None):
-        identity = shapes.sample(generator("train", number))
-        rows.append(shapes.vertices(identity).astype(np.float32).reshape(-1))
-        people.append((identity.phenotype.gender, identity.phenotype.age))
+        if scans and number % 2:
+            rng = generator("scans/train", number)
+            vertices, person = sample_scanned(scans, shapes, rng), (float(rng.random()), ADULT)
+        else:
+            identity = shapes.sample(generator("train", number))
+            vertices, person = shapes.vertices(identity), (identity.phenotype.gender, identity.phenotype.age)
+        rows.append(vertices.astype(np.float32).reshape(-1))
+        people.append(person)
     points = np.stack(rows)
     mean = points.mean(0)
     points -= mean
@@ -114,9 +124,11 @@ def main() -> None:
     parser.add_argument("--bases", type=int, default=240)
     parser.add_argument("--backgrounds", type=Path, default=Path(".data/backgrounds/train"))
     parser.add_argument("--photos", type=Path, default=Path(".data/heads/photos"))
+    parser.add_argument("--scans", type=Path, help="of `export.heads.scans.scanned_heads`")
     options = parser.parse_args()
     maker = make_maker()
-    arrays, lost = packed_heads(maker, options.heads, options.bases)
+    scans = read_scanned_heads(options.scans) if options.scans else None
+    arrays, lost = packed_heads(maker, options.heads, options.bases, scans)
     print(lost)
     skin = maker.skin.astype(np.uint8)
     skin = jpegs([cv2.resize(skin, (SKIN_PX, SKIN_PX), interpolation=cv2.INTER_AREA)])

@@ -59,7 +59,7 @@ class Sizes:
         """batch: another one than the device's usual."""
         if device.type == "cuda":
             return Sizes(16, 4, 3072, 512, batch or 256)
-        return Sizes(2, 2, 8, 4, batch or 8)
+        return Sizes(2, 2, 64, 8, batch or 16)
 
 
 class Supply:
@@ -229,7 +229,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=520, help="from start to end, all told")
     parser.add_argument("--until", type=float, metavar="TIME", help="of the end, Unix time, instead of --seconds")
     parser.add_argument("--rate", type=float, default=2e-3)
-    parser.add_argument("--batch", type=int, help="crops; default: 256 on a graphics processor, else 8")
+    parser.add_argument("--batch", type=int, help="crops; default: 256 on a graphics processor, else 16")
     parser.add_argument("--photo-share", dest="photo_fraction", type=float, default=0.12, help="of a batch: real faces")
     parser.add_argument("--workers", type=int, default=5, help="processes that make heads")
     parser.add_argument("--cpu", action="store_true", help="leave a graphics processor alone")

@@ -1,0 +1,1 @@
+"""Heads of scanned people, brought into the vertices of the template head."""

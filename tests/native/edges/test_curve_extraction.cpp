@@ -332,6 +332,30 @@ TEST(CurveExtraction, ALineEndsWhereItsSurfaceDoes) {
   }
 }
 
+// Depth cameras have margins without depth, and shadows of near things on far ones: nothing ends there.
+TEST(CurveExtraction, WhereKnownDepthMerelyEndsIsNoCurve) {
+  const auto with = [](auto&& depth_of, auto&& distance_of) {
+    EdgeField field = plain_field(320, 240, 16);
+    for (size_t i = 0; i < field.distance_r.size(); ++i) {
+      field.depth_m[i] = depth_of(int(i % 320), int(i / 320));
+      field.distance_r[i] =
+          field.depth_m[i] > 0 ? float(std::clamp(distance_of(int(i % 320), int(i / 320)), 0.0, 16.0)) : 16;
+      field.kind[i] = maq::kBoundaryEdge;
+    }
+    CurveExtractor extractor;
+    return extractor.extract(field);
+  };
+  const auto from_row = [](double row) { return [row](int, int y) { return std::abs(y - row + 0.5); }; };
+  EXPECT_EQ(with([](int, int y) { return y < 12 ? 0.0f : 1.0f; }, from_row(12)).curves.size(), 0u) << "a margin";
+  EXPECT_EQ(with([](int, int y) { return y < 60 ? 0.0f : 1.0f; }, from_row(60)).curves.size(), 1u) << "no background";
+  const auto shadow = with([](int x, int) { return x < 150   ? 1.0f
+                                                   : x < 162 ? 0.0f
+                                                             : 1.5f; },
+                           [](int x, int) { return std::min(std::abs(x - 149.5), std::abs(x - 161.5)); });
+  ASSERT_EQ(shadow.curves.size(), 1u) << "of the near surface alone";
+  EXPECT_NEAR(shadow.points[size_t(shadow.curves[0].first_point)].z, 1, 1e-3);
+}
+
 TEST(CurveExtraction, MoreCurvesThanTheLimitAreCounted) {
   EdgeField field = plain_field(320, 240, 16);
   for (size_t i = 0; i < field.distance_r.size(); ++i)

@@ -9,12 +9,17 @@ namespace maq {
 namespace {
 
 constexpr double kStraightSpacing_px = 6, kCurvedSpacing_px = 3, kCurvedHalfWindow_px = 4;
-constexpr double kMinShift_px = 1;            // the network blurs pixels nearer to the edge
-constexpr double kFallen_px = 3;              // nearer to the edge the field does not show another one
-constexpr double kFarthestShift_px = 5;       // the field's value is best near the edge
-constexpr double kBelief_px = 2.5;            // values that would move it farther belong to another edge
-constexpr double kClearly_px = 2;             // by which the field has the edge nearer on the side that it belongs to
-constexpr double kBestAcross_px = 0.08;       // lower limit of the uncertainty of a position in the image
+constexpr double kMinShift_px = 1;       // the network blurs pixels nearer to the edge
+constexpr double kFallen_px = 3;         // nearer to the edge the field does not show another one
+constexpr double kFarthestShift_px = 5;  // the field's value is best near the edge
+constexpr double kBelief_px = 2.5;       // values that would move it farther belong to another edge
+constexpr double kClearly_px = 2;        // by which the field has the edge nearer on the side that it belongs to
+constexpr double kBestAcross_px = 0.08;  // lower limit of the uncertainty of a position in the image
+// Unknown depth beside an edge is looked across so far, in parts of the frame's longer side: shadows and margins of
+// depth cameras are no wider.
+constexpr double kGap = 0.06;
+constexpr double kNearer = 0.97;              // depth of what throws a shadow, as a part of that of the edge
+constexpr int kSkipped_px = 3;                // next to an edge, where depth of both surfaces may be mixed
 constexpr double kSamePlace_px = 1;           // edges of a near and a far surface this close in the image are one chain
 constexpr double kApart_r = 2;                // edges of surfaces nearer than this are one
 constexpr double kNoisy_r = 1.5, kWider = 3;  // depth that is so far from its surface needs a band so much wider
@@ -427,6 +432,28 @@ void CurveStations::straighten() {
   }
 }
 
+namespace {
+
+// Whether nothing ends at a boundary but what the camera knows: beyond it depth is unknown up to the image's border (a
+// margin), or up to something nearer (its shadow). Something farther, or nothing for a long way, is a real boundary.
+bool is_end_of_knowledge(const EdgeField& field, const CurveStation& s) {
+  if (s.near_side < 0) return false;
+  const SurfacePatch& patch = s.side[size_t(s.near_side)];
+  const double q = patch.terms != 0 ? patch.inverse_depth(s.x, s.y) : 0;
+  if (!(q > 0)) return false;
+  const double out_x = s.near_side == 0 ? -s.ty : s.ty, out_y = s.near_side == 0 ? s.tx : -s.tx;
+  const int farthest = int(kGap * std::max(field.width, field.height));
+  for (int step = kSkipped_px; step <= farthest; ++step) {
+    const auto x = int(std::lround(s.x + step * out_x)), y = int(std::lround(s.y + step * out_y));
+    if (x < 0 || y < 0 || x >= field.width || y >= field.height) return step > kSkipped_px;
+    const double depth = double(field.depth_m[size_t(y) * size_t(field.width) + size_t(x)]);
+    if (depth > 0) return step > kSkipped_px && depth * q < kNearer;
+  }
+  return false;
+}
+
+}  // namespace
+
 // The point that is nearest to all three: the place across from the field, and the depth of either surface, each with
 // its variance. Surfaces that meet at a large angle say where the edge is better than the field does; at a small one
 // they say nothing about it, and the field has it.
@@ -436,6 +463,7 @@ bool CurveStations::find_points(const EdgeField& field) {
   int known = 0;
   for (CurveStation& s : stations) {
     s.is_known = false;
+    if (s.is_boundary && is_end_of_knowledge(field, s)) continue;
     const double most = 1 / (kBestAcross_px * kBestAcross_px);
     const double field_weight = s.across_weight > 0 ? std::min(s.across_weight, most) : 1;
     double a00 = field_weight, a01 = 0, a11 = 0, b0 = 0, b1 = 0;

@@ -51,15 +51,18 @@ template <class Source>
 MAQ_SIMD_CLONES void mix(const std::vector<Source>& sources, const float* before, int count, float* values) {
   for (const Source& source : sources) {
     if (source.share > 0) {
-      const float* const a = before + source.from[0];
-      const float* const b = before + source.from[1];
-      const float* const c = before + source.from[2];
-      const float* const d = before + source.from[3];
+      // Nothing here lies in the same memory, so that compilers take vectors.
+      const float* __restrict a = before + source.from[0];
+      const float* __restrict b = before + source.from[1];
+      const float* __restrict c = before + source.from[2];
+      const float* __restrict d = before + source.from[3];
+      float* __restrict to = values;
+      const float of_a = source.weights[0], of_b = source.weights[1], of_c = source.weights[2],
+                  of_d = source.weights[3], share = source.share;
       for (int k = 0; k < count; ++k) {
-        const float was =
-            a[k] * source.weights[0] + b[k] * source.weights[1] + c[k] * source.weights[2] + d[k] * source.weights[3];
-        const float change = source.share * (was - values[k]);
-        values[k] += change == change ? change : 0;  // NaN of one frame is not kept
+        const float was = a[k] * of_a + b[k] * of_b + c[k] * of_c + d[k] * of_d;
+        const float change = share * (was - to[k]);
+        to[k] += change == change ? change : 0;  // NaN of one frame is not kept
       }
     }
     values += count;

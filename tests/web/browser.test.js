@@ -1,11 +1,11 @@
 // The page in headless Chromium.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { frames, heapBytes, launch, openPage, pageFolder, serve, status, waitForFrames } from './browser.js';
-import { converted, root, scratch } from './native.js';
+import { converted, projectWithPackage, root, scratch } from './native.js';
 
 let server;
 let browser;
@@ -174,14 +174,8 @@ test('memory does not grow with frames', async () => {
 });
 
 test('the example of the README runs in what Vite builds of an empty project', async () => {
-  const project = join(scratch, 'vite');
-  rmSync(project, { recursive: true, force: true });
-  mkdirSync(project, { recursive: true });
-  writeFileSync(join(project, 'package.json'), '{"type": "module", "private": true}');
-  const tarball = readdirSync(join(root, 'build/web')).find((name) => name.endsWith('.tgz'));
-  execFileSync('npm', ['install', '--silent', '--no-audit', '--no-fund', join(root, 'build/web', tarball)], { cwd: project });
-  const readme = readFileSync(join(project, 'node_modules/maquette/README.md'), 'utf8');
-  writeFileSync(join(project, 'example.js'), readme.match(/```js\n(.*?)```/s)[1]);
+  const { project, examples } = projectWithPackage('vite');
+  writeFileSync(join(project, 'example.js'), examples[0]);
   writeFileSync(
     join(project, 'main.js'),
     `const video = document.querySelector('video');

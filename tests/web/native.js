@@ -1,6 +1,6 @@
 // What the native library says, and images as both see them.
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, readFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { PNG } from 'pngjs';
@@ -35,4 +35,16 @@ export function nativePlanes(path, ...options) {
 
 export function share(a, b) {
   return a.reduce((same, value, i) => same + (value === b[i] ? 1 : 0), 0) / a.length;
+}
+
+// A new project with the packed package installed, and the examples of its README in JavaScript.
+export function projectWithPackage(name) {
+  const project = join(scratch, name);
+  rmSync(project, { recursive: true, force: true });
+  mkdirSync(project, { recursive: true });
+  writeFileSync(join(project, 'package.json'), '{"type": "module", "private": true}');
+  const tarball = readdirSync(join(root, 'build/web')).find((file) => file.endsWith('.tgz'));
+  execFileSync('npm', ['install', '--silent', '--no-audit', '--no-fund', join(root, 'build/web', tarball)], { cwd: project });
+  const readme = readFileSync(join(project, 'node_modules/maquette/README.md'), 'utf8');
+  return { project, examples: [...readme.matchAll(/```js\n(.*?)```/gs)].map(([, code]) => code) };
 }

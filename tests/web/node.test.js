@@ -2,11 +2,11 @@
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { gzipSync } from 'node:zlib';
-import { mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { DensePose, KEYPOINT_NAMES, MaquetteError, PART_COLOURS, PART_NAMES } from 'maquette';
-import { converted, nativePlanes, readPng, root, scratch, share } from './native.js';
+import { converted, nativePlanes, projectWithPackage, readPng, root, share } from './native.js';
 
 const photo = converted('photo.png');
 const image = readPng(photo);
@@ -105,14 +105,7 @@ test('options of the types are those of the C API', () => {
 });
 
 test('the packed package installs in an empty project and runs the example of its README', () => {
-  const project = join(scratch, 'project');
-  rmSync(project, { recursive: true, force: true });
-  mkdirSync(project, { recursive: true });
-  writeFileSync(join(project, 'package.json'), '{"type": "module", "private": true}');
-  const tarball = readdirSync(join(root, 'build/web')).find((name) => name.endsWith('.tgz'));
-  execFileSync('npm', ['install', '--silent', '--no-audit', '--no-fund', join(root, 'build/web', tarball)], { cwd: project });
-  const readme = readFileSync(join(project, 'node_modules/maquette/README.md'), 'utf8');
-  const examples = [...readme.matchAll(/```js\n(.*?)```/gs)].map(([, code]) => code);
+  const { project, examples } = projectWithPackage('project');
   writeFileSync(join(project, 'node.js'), examples[1]);
   assert.match(execFileSync('node', ['node.js'], { cwd: project, encoding: 'utf8' }), /^0 people$/m);
   writeFileSync(join(project, 'browser.ts'), examples[0].replace("querySelector('video')", "querySelector('video')!"));

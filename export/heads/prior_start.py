@@ -1,4 +1,4 @@
-"""Codes to begin a training of the prior with: principal components, or those of a trained prior and further ones."""
+"""The codes that a training of the prior begins with: principal components, or the codes of a trained prior and more."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def fitted_codes_of(visible: Tensor, mean: Tensor, slopes: Tensor, sigma: Tensor
 
 
 def start_codes(vertices: Tensor, visible: Tensor, known: Tensor, further: int) -> Tensor:
-    """Codes [H, K + further] to begin with. vertices, visible [H, V, 3]: skin, and skin or the hair above it; `known`
-    [N, K]: codes of the first heads. Those of the others are what explains their visible vertices best, linearly;
-    further ones are principal components of what that leaves of their faces."""
+    """Returns the codes that a training begins with, [H, K + further]. vertices, visible [H, V, 3]: skin, and skin or
+    the hair above it. known [N, K]: codes of the first N heads. The other heads get the codes that explain their
+    visible vertices best by a linear model. The further codes are principal components of what is left of the faces."""
     count, codes = known.shape
     mean, slopes = linear_slopes(known, visible[:count])
     left = visible[:count] - mean - torch.einsum("vck,hk->hvc", slopes, known)

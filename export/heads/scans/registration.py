@@ -36,7 +36,7 @@ LANDMARKS = {
 STIFFNESS = (30, 30, 30, 10, 10, 10, 3, 3, 3, 1, 1, 1, 0.3, 0.3, 0.3, 0.1, 0.1, 0.1)
 FAR_DM, NEAR_DM = 0.4, 0.2
 ALONG = 0.05  # weight of distances along the surface; those across it have 1
-MIN_COSINE = 0.5  # of normals that can be those of the same place
+MIN_COSINE = 0.5  # between the normals of two points that may be the same place
 
 
 def _in_head_frame(points: np.ndarray) -> np.ndarray:

@@ -76,6 +76,25 @@ void for_offsets(const EdgeField& field, const CurveStation& s, int side, double
   });
 }
 
+// Whether a boundary is merely where known depth ends: beyond it depth is unknown up to the image's border (a margin),
+// or up to something nearer (which throws a shadow). A boundary is real if something farther follows, or nothing for
+// long.
+bool is_end_of_knowledge(const EdgeField& field, const CurveStation& s) {
+  if (s.near_side < 0) return false;
+  const SurfacePatch& patch = s.side[size_t(s.near_side)];
+  const double q = patch.terms != 0 ? patch.inverse_depth(s.x, s.y) : 0;
+  if (!(q > 0)) return false;
+  const double out_x = s.near_side == 0 ? -s.ty : s.ty, out_y = s.near_side == 0 ? s.tx : -s.tx;
+  const int farthest = int(kGap * std::max(field.width, field.height));
+  for (int step = kSkipped_px; step <= farthest; ++step) {
+    const auto x = int(std::lround(s.x + step * out_x)), y = int(std::lround(s.y + step * out_y));
+    if (x < 0 || y < 0 || x >= field.width || y >= field.height) return step > kSkipped_px;
+    const double depth = double(field.depth_m[size_t(y) * size_t(field.width) + size_t(x)]);
+    if (depth > 0) return step > kSkipped_px && depth * q < kNearer;
+  }
+  return false;
+}
+
 }  // namespace
 
 // Evenly along the chain; of a straight one on the line through it.
@@ -431,28 +450,6 @@ void CurveStations::straighten() {
     s.x = cx + u * tx, s.y = cy + u * ty, s.tx = tx, s.ty = ty;
   }
 }
-
-namespace {
-
-// Whether nothing ends at a boundary but what the camera knows: beyond it depth is unknown up to the image's border (a
-// margin), or up to something nearer (its shadow). Something farther, or nothing for a long way, is a real boundary.
-bool is_end_of_knowledge(const EdgeField& field, const CurveStation& s) {
-  if (s.near_side < 0) return false;
-  const SurfacePatch& patch = s.side[size_t(s.near_side)];
-  const double q = patch.terms != 0 ? patch.inverse_depth(s.x, s.y) : 0;
-  if (!(q > 0)) return false;
-  const double out_x = s.near_side == 0 ? -s.ty : s.ty, out_y = s.near_side == 0 ? s.tx : -s.tx;
-  const int farthest = int(kGap * std::max(field.width, field.height));
-  for (int step = kSkipped_px; step <= farthest; ++step) {
-    const auto x = int(std::lround(s.x + step * out_x)), y = int(std::lround(s.y + step * out_y));
-    if (x < 0 || y < 0 || x >= field.width || y >= field.height) return step > kSkipped_px;
-    const double depth = double(field.depth_m[size_t(y) * size_t(field.width) + size_t(x)]);
-    if (depth > 0) return step > kSkipped_px && depth * q < kNearer;
-  }
-  return false;
-}
-
-}  // namespace
 
 // The point that is nearest to all three: the place across from the field, and the depth of either surface, each with
 // its variance. Surfaces that meet at a large angle say where the edge is better than the field does; at a small one

@@ -14,9 +14,9 @@ using namespace simd;
 constexpr size_t kTile = 4;    // output pixels that a step computes at once
 constexpr size_t kTiles = 32;  // tiles whose inputs stay in the cache while the weights of 8 outputs are used
 constexpr size_t kPixels = kTile * kTiles;
-constexpr int kBlock = 8;  // output channels of a step
-constexpr size_t kDepthwisePixels = 32;
-// Less work than this is not worth waking a thread up: products of one task, some 20 microseconds of them.
+constexpr int kBlock = 8;                // output channels of a step
+constexpr size_t kDepthwisePixels = 32;  // of a task, which has few products for each pixel
+// Products of a task that is worth waking a thread up: some 20 microseconds.
 constexpr size_t kProducts = 100000;
 
 int blocks_of(int channels) { return (channels + kBlock - 1) / kBlock; }
@@ -45,8 +45,9 @@ inline Ints quantize(Ints low, Ints high, const float* scales, const Quantizatio
   return narrow(round_to_ints(first), round_to_ints(second));
 }
 
-// Calls work(first pixel, pixels, first block, end of blocks, thread) for parts of a layer: the given number of pixels,
-// and all blocks of output channels, or some of them where there are few pixels. `products` counts those of the layer.
+// Cuts a layer into tasks and calls work(first pixel, pixels, first block, end of blocks, thread) for each. A task has
+// `part_pixels` pixels and all blocks of output channels; if the layer has few pixels, a task has some of the blocks.
+// `products`: how many the whole layer computes.
 template <class Work>
 void share(WorkerThreads& threads, size_t pixels, size_t part_pixels, int blocks, size_t products, Work&& work) {
   const size_t parts = (pixels + part_pixels - 1) / part_pixels;

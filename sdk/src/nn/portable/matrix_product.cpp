@@ -42,8 +42,8 @@ Extents MatrixProduct::output_extents(const std::vector<const Tensor*>& inputs) 
 
 void MatrixProduct::run(const std::vector<const Tensor*>& inputs, Tensor& output, WorkerThreads& threads) {
   const size_t blocks = (outputs_ + kWidth - 1) / kWidth, pixels = output.pixels();
-  // Some 16,384 products a task, but at least those of one pixel and 8 outputs.
-  const size_t part = std::max<size_t>(1, 16384 / (inputs_ * kWidth));
+  // A task has some 16,384 products, or those of one pixel and 8 outputs if these are more.
+  const size_t part = std::max<size_t>(1, 16384 / std::max<size_t>(1, inputs_ * kWidth));
   threads.run((pixels + part - 1) / part * blocks, [&](size_t task, int) {
     const size_t first = task % blocks * kWidth, begin = task / blocks * part;
     for (size_t pixel = begin; pixel < std::min(begin + part, pixels); ++pixel) {

@@ -1,4 +1,4 @@
-"""The codes that a training of the prior begins with: principal components, or the codes of a trained prior and more."""
+"""The codes that a training of the prior begins with: principal components, or those of a trained prior and more."""
 
 from __future__ import annotations
 

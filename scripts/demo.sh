@@ -2,8 +2,8 @@
 # Runs the built SDK on the bundled photo (people, a head of one), clip, depth picture and room, and on a real place:
 # scripts/demo.sh [OUTPUT_FOLDER]
 #
-# The capture of a real object is fetched once (box, or the captures in .data/places/real). That needs Python 3.11, a
-# network and some minutes. Without a network the demo says so and goes on; REAL=no leaves the capture out.
+# The capture of a real object (box, or the captures in .data/places/real) and photos of a house are fetched once. That
+# needs Python 3.11, a network and some minutes. Without a network the demo says so and goes on; REAL=no leaves the capture out.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 [ -t 2 ] || export TQDM_DISABLE=1  # progress bars are for terminals
@@ -75,6 +75,19 @@ fly() {
     "$maquette" scene render "$scene.maqs" --capture "$1" --path through --seconds 6 --size 640x480 --out "$scene.mp4"
 }
 
+# make_place NAME: fetches plain photos of a real place; makes a scene of them in one command, and a flight along its cameras.
+make_place() {
+    local photos=.data/places/photos/$1 python
+    python=(env PYTHONPATH=.:python .venv/bin/python)
+    scripts/make-venv.sh captures && { [ -d "$photos" ] || "${python[@]}" -m export.captures photos "$1"; } || return 0
+    printf '\n== maquette scene make %s --out %s.maqs\n' "$photos" "$out/$1"
+    "${python[@]}" -m maquette scene make "$photos" --out "$out/$1.maqs"
+    printf '\n== maquette scene render %s.maqs --capture %s-work/capture --path through --seconds 6 --size 640x480 --out %s.mp4\n' \
+        "$out/$1" "$out/$1" "$out/$1"
+    "$maquette" scene render "$out/$1.maqs" --capture "$out/$1-work/capture" --path through --seconds 6 --size 640x480 \
+        --out "$out/$1.mp4"
+}
+
 # first_depth FOLDER: the first depth image of a capture as a source.
 first_depth() {
     python3 - "$1" <<'PYTHON'
@@ -107,6 +120,7 @@ if fetch_real; then
         fly "$(dirname "$transforms")"
         edges "$(dirname "$transforms")"
     done
+    make_place house
 fi
 
 printf '\nPictures to look at, in %s:\n' "$out"

@@ -1,4 +1,5 @@
-"""Real places as captures: photographs fetched from packages, posed by structure from motion, made dense."""
+"""Real places as captures: photographs fetched from packages, posed by structure from motion, made dense; or the plain
+photographs, for `maquette scene make`."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import sys
 from pathlib import Path
 
 from export.captures.dense import POINTS
-from export.captures.originals import ORIGINALS
+from export.captures.originals import ORIGINALS, write_plain
 from export.captures.structure import CaptureError
 from export.photos.packages import NetworkError, PackageError, load_packages
 
@@ -16,8 +17,10 @@ examples:
   python -m export.captures list         what there is, with package and licence; fetches nothing
   python -m export.captures fetch        all of them into .data/places/real, a minute or two each
   python -m export.captures fetch house  only this one
+  python -m export.captures photos house the plain photographs alone, into .data/places/photos/house
 """
 
+CAPTURES, PHOTOS = Path(".data/places/real"), Path(".data/places/photos")
 UNREACHABLE = 69  # exit status when a package server cannot be reached (EX_UNAVAILABLE of sysexits.h)
 
 
@@ -26,9 +29,9 @@ def main(argv: list[str] | None = None) -> int:
         prog="python -m export.captures", description=__doc__, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    parser.add_argument("command", choices=("fetch", "list"))
+    parser.add_argument("command", choices=("fetch", "list", "photos"))
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
-    parser.add_argument("--out", type=Path, default=Path(".data/places/real"), help="default: %(default)s")
+    parser.add_argument("--out", type=Path, help=f"default: {CAPTURES}; for photos: {PHOTOS}")
     parser.add_argument("--points", type=int, default=POINTS, help="at most so many; default: %(default)s")
     parser.add_argument("--force", action="store_true", help="make again what is already there")
     arguments = parser.parse_args(argv)
@@ -36,8 +39,9 @@ def main(argv: list[str] | None = None) -> int:
     unknown = sorted(set(arguments.names) - set(known))
     if unknown:
         parser.error(f"there is no {', '.join(unknown)}; there are {', '.join(known)}")
+    out = arguments.out or (PHOTOS if arguments.command == "photos" else CAPTURES)
     for original in ORIGINALS:
-        folder = arguments.out / original.name
+        folder = out / original.name
         if arguments.names and original.name not in arguments.names:
             continue
         if arguments.command == "list":
@@ -47,9 +51,12 @@ def main(argv: list[str] | None = None) -> int:
             print(f"{folder} is there already")
         else:
             try:
+                folder.parent.mkdir(parents=True, exist_ok=True)
+                if arguments.command == "photos":
+                    print(f"{folder}: {write_plain(original, folder)} photos")
+                    continue
                 from export.captures.folder import make
 
-                folder.parent.mkdir(parents=True, exist_ok=True)
                 photos, posed, points = make(original, folder, arguments.points)
             except ModuleNotFoundError as error:
                 print(f"{error}. Run: scripts/make-venv.sh captures", file=sys.stderr)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gzip
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -40,6 +42,21 @@ class Original:
         """Fetches the package unless it is here. Raises PackageError."""
         with PackageReader(fetch(load_packages()[self.package])) as reader:
             return self.read(reader)
+
+
+def write_plain(original: Original, folder: Path) -> int:
+    """Writes the photos of an original as PNG files, atomically, and gives their number. Raises PackageError, OSError."""
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    photos = original.photos()
+    for number, photo in enumerate(photos):
+        file = partial / f"{number:03d}.png"
+        if not cv2.imwrite(str(file), photo.image):
+            raise OSError(f"{file} cannot be written; is the disk full?")
+    shutil.rmtree(folder, ignore_errors=True)
+    partial.rename(folder)
+    return len(photos)
 
 
 def _read_box(reader: PackageReader) -> list[Photo]:

@@ -36,20 +36,23 @@ class Sample:
 class Sampling:
     """crop_px: side of the crops, a multiple of 32. sources: photos a crop is made from, at least and at most; the
     paper has 3. margin_px: the extractor sees of a photo a square so much wider than the crop. long_side_px: larger
-    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample."""
+    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample. unseen: how often
+    the target is a held-out photo, which the cloud was not made from."""
 
     crop_px: int = 256
     sources: tuple[int, int] = (3, 3)
     margin_px: int = 64
     long_side_px: int = 640
     jitter: float = 0.8
+    unseen: float = 0.75
 
 
 def draw_sample(captures: Sequence[Capture], sampling: Sampling, rng: np.random.Generator) -> Sample:
     """Depends on the generator alone. Raises CaptureError where a photo cannot be decoded."""
     capture = captures[rng.integers(len(captures))]
     places = capture.cloud.positions
-    target = int(rng.integers(len(capture.cameras)))
+    unseen = sorted(capture.held_out) if rng.random() < sampling.unseen else []
+    target = int(rng.choice(unseen or len(capture.cameras)))
     scored = places[rng.integers(len(places), size=min(SCORED_POINTS, len(places)))]
     count = int(rng.integers(sampling.sources[0], sampling.sources[1] + 1))
     chosen = drawn(target, capture.cameras, capture.sources(), scored, count, rng)

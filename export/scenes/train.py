@@ -5,8 +5,8 @@
 
 `--data` holds folders `train` and `val` of captures (export.scenes.captures). `--pretrained` is the file of
 export.teachers.backbone: the extractor's trunk starts from it, and images are compared by its features; without it
-the trunk starts from random weights and images are compared by their pixels alone. It resumes from `--out` by itself,
-saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt (for export.scenes.export_onnx), log.json, curves.png,
+the trunk starts from random weights and images are compared by their pixels alone. `--start` begins with the weights of
+another run instead. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt (for export.scenes.export_onnx), log.json, curves.png,
 and sample.png: photo, ours, the plain points.
 """
 
@@ -33,7 +33,7 @@ from export.scenes.geometry.source_views import scores
 from export.scenes.image_quality import psnr_db
 from export.scenes.losses import LossWeights, image_terms, own_rasters
 from export.scenes.networks.extractor import STRIDE
-from export.scenes.networks.system import Networks, save_networks
+from export.scenes.networks.system import Networks, load_networks, save_networks
 from export.scenes.perceptual import Perceptual, load_perceptual
 from export.scenes.samples import Sample, Sampling, draw_sample
 from export.training import (
@@ -141,6 +141,7 @@ class TrainingConfig:
     threads: int | None = None
     precision: str = "float32"
     pretrained: Path | None = None
+    start: Path | None = None
     validate_minutes: float = 10
 
 
@@ -160,7 +161,9 @@ class Run:
                 raise SystemExit(
                     f"{config.out} holds a run of --size {saved['size']}, not {config.size}: give another --out."
                 )
-        if self.perceptual and not saved:
+        if config.start and not saved:
+            self.networks.load_state_dict(load_networks(config.start).state_dict())
+        elif self.perceptual and not saved:
             self.networks.extractor.trunk.load_state_dict(self.perceptual.trunk.state_dict())
         if self.perceptual:
             # Layers that found edges in photographs need no training, and theirs would be the most expensive: half of
@@ -278,6 +281,7 @@ def parsed() -> TrainingConfig:
         help="of convolutions; processors with AVX512_BF16 or AMX train about twice as fast with bfloat16",
     )
     parser.add_argument("--pretrained", type=Path, help="weights of the trunk (export.teachers.backbone)")
+    parser.add_argument("--start", type=Path, help="weights to begin with, such as export/weights/scenes.pt")
     parser.add_argument("--validate-minutes", type=float, default=default.validate_minutes)
     options = parser.parse_args()
     for name, value, smallest in (("crop", options.crop, STRIDE), ("margin", options.margin, 0)):

@@ -133,7 +133,9 @@ class Scene(NativeObject):
 
     @staticmethod
     def open(file: str | os.PathLike[str] | bytes) -> Scene:
-        """Reads a file that `save` wrote, by its path or its bytes. Raises MaquetteError."""
+        """Reads a file that `save` wrote, by its path or its bytes. Also reads splats (.ply, .spz), by their path.
+
+        Raises MaquetteError."""
         n = native()
         if isinstance(file, bytes):
             data = n.ffi.from_buffer(file)

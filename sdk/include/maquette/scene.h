@@ -70,6 +70,9 @@ typedef struct maq_scene_build_config {
   uint32_t max_views;      /* if there are more photos, an even selection is used. 0: no limit */
   int32_t use_held_out;    /* 1: also use photos that the capture holds out for comparison; 0: do not */
   maq_scene_points points; /* with MAQ_SCENE_POINTS_DEPTH, max_points 0 means 1.5 million */
+  /* Above 0: the scene is of splats, one for each point, which are fitted to the photos for so many seconds of
+   * wall-clock time. Save it to a .ply, .spz or .glb file. 0: points. At most 86400 */
+  double splat_fit_s;
 } maq_scene_build_config;
 
 typedef struct maq_scene_build_stats {
@@ -185,8 +188,11 @@ MAQ_API maq_status maq_scene_open_memory(maq_context* context, const void* data,
 MAQ_API void maq_scene_destroy(maq_scene* scene);
 
 /* Writes the scene to a file, atomically: an existing file stays until the new one is complete. The folder must exist.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_UNSUPPORTED (splats). Blocks until
- * the file is on the disk. */
+ * The extension tells the kind of file. A .ply, .spz or .glb file has splats for other programs: 3D Gaussian Splatting,
+ * SPZ version 3, glTF with KHR_gaussian_splatting. Points become flat splats without view dependence. Every other
+ * extension is a scene file (.maqs).
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_UNSUPPORTED (splats to a scene file,
+ * coordinates over 8 million to an .spz file), MAQ_ERROR_OUT_OF_MEMORY. Blocks until the file is on the disk. */
 MAQ_API maq_status maq_scene_save(const maq_scene* scene, const char* path);
 
 /* Writes positions and mean colours as a binary PLY file, for other programs; atomically.

@@ -62,6 +62,25 @@ int show(const InfoOptions& options) {
   return 0;
 }
 
+struct ExportOptions {
+  std::string scene;
+  std::string out;
+};
+
+int export_splats(const ExportOptions& options) {
+  const std::string kind = std::filesystem::u8path(options.out).extension().string();
+  if (kind != ".ply" && kind != ".spz" && kind != ".glb") {
+    throw std::runtime_error("--out is " + options.out + ", but must end with .ply, .spz or .glb.");
+  }
+  make_folder_of(options.out);
+  require_writable(options.out);
+  const maquette::Context context = open_context();
+  const maquette::Scene scene(context, options.scene);
+  scene.save(options.out);
+  print_output("%s: %" PRIu64 " splats\n", options.out.c_str(), scene.info().point_count);
+  return 0;
+}
+
 }  // namespace
 
 nlohmann::ordered_json describe_scene(const maq_scene_info& info, uint64_t file_bytes) {
@@ -102,4 +121,14 @@ void add_scene_command(CLI::App& app, int* exit_code) {
       ->required();
   command->add_option("--json", options->json, "Also write this information to this file");
   command->callback([=] { *exit_code = show(*options); });
+  auto exporting = std::make_shared<ExportOptions>();
+  CLI::App* to_splats = scene->add_subcommand("export", "Write a scene as 3D Gaussians (splats) for other programs");
+  to_splats->add_option("scene", exporting->scene, "A file made by `maquette scene build`, or splats (.ply, .spz)")
+      ->required();
+  to_splats
+      ->add_option("-o,--out", exporting->out,
+                   "File of the splats: .ply (3D Gaussian Splatting), .spz (version 3), or .glb "
+                   "(KHR_gaussian_splatting)")
+      ->required();
+  to_splats->callback([=] { *exit_code = export_splats(*exporting); });
 }

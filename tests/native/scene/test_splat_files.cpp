@@ -1,7 +1,9 @@
 // Splats from PLY and SPZ files, and files that are damaged or something else.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "scene/splats/gzip_file.h"
 #include "scene/splats/splat_files.h"
@@ -200,6 +202,74 @@ TEST_F(SplatFiles, EveryTruncatedOrChangedFileIsASentenceOrFiniteSplats) {
   }
   EXPECT_GT(refused, 200u);
   EXPECT_GT(accepted, 200u);
+}
+
+// One that has been read, with harmonics and a fit's odd numbers.
+MadeSplats to_write() {
+  MadeSplats made = made_splats(50, 2, 9, 3, {100, -20, 7});
+  made.splats[3].opacity = 0.9999999;
+  return made;
+}
+
+TEST_F(SplatFiles, WrittenPlyAndSpzFilesAreReadAgain) {
+  const MadeSplats made = to_write();
+  const maq::Splats splats = read(made.ply());
+  maq::write_splat_file(splats, folder_.file("again.PLY"));
+  expect_near(maq::read_splat_file(folder_.file("again.PLY")), made, 2e-5, 1e-5, 1e-5, 1e-6, 1e-5, 1.3e-4);
+  maq::write_splat_file(splats, folder_.file("again.spz"));
+  expect_near(maq::read_splat_file(folder_.file("again.spz")), made, 1.6e-5, 0.033, 4e-3, 2e-3, 4e-3, 4.1e-3);
+}
+
+TEST_F(SplatFiles, PositionsInAnSpzFileUseAllOfItsBits) {
+  for (const double size : {1e-3, 1.0, 1000.0, 1e6}) {
+    const MadeSplats made = made_splats(20, 0, 2, size);
+    maq::write_splat_file(read(made.ply()), folder_.file("sized.spz"));
+    const maq::Splats splats = maq::read_splat_file(folder_.file("sized.spz"));
+    for (size_t i = 0; i < splats.position.size(); ++i) {
+      const double found = splats.origin[i % 3] + double(splats.position[i]);
+      EXPECT_NEAR(found, made.splats[i / 3].position[i % 3], std::max(1.6e-7 * size, 8e-6));
+    }
+  }
+  const maq::Splats far = read(made_splats(2, 0, 2, 1, {1e7, 0, 0}).ply());
+  expect_error(MAQ_ERROR_UNSUPPORTED, ".ply", [&] { maq::write_splat_file(far, folder_.file("far.spz")); });
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("far.spz")));
+}
+
+TEST_F(SplatFiles, AFlagOfAntialiasingIsKept) {
+  maq::Splats splats = read(made_splats(2, 0).ply());
+  EXPECT_FALSE(splats.is_antialiased);
+  splats.is_antialiased = true;
+  for (const char* name : {"flag.ply", "flag.spz"}) {
+    maq::write_splat_file(splats, folder_.file(name));
+    EXPECT_TRUE(maq::read_splat_file(folder_.file(name)).is_antialiased) << name;
+  }
+}
+
+TEST_F(SplatFiles, AGlbFileHasTheAttributesOfTheExtension) {
+  const MadeSplats made = to_write();
+  const std::vector<uint8_t> bytes = maq::glb_of(read(made.ply()));
+  uint32_t json_bytes = 0;
+  std::memcpy(&json_bytes, bytes.data() + 12, sizeof json_bytes);
+  const nlohmann::json gltf = nlohmann::json::parse(bytes.begin() + 20, bytes.begin() + 20 + json_bytes);
+  const auto& primitive = gltf["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 0);
+  EXPECT_EQ(primitive["extensions"]["KHR_gaussian_splatting"]["kernel"], "ellipse");
+  EXPECT_EQ(primitive["attributes"].size(), 6u + 3 + 5);
+  for (const auto& [name, accessor] : primitive["attributes"].items()) {
+    EXPECT_EQ(gltf["accessors"][accessor.get<size_t>()]["count"], 50) << name;
+  }
+  const auto floats = [&](const std::string& name) {
+    const auto& view = gltf["bufferViews"][primitive["attributes"]["KHR_gaussian_splatting:" + name].get<size_t>()];
+    std::vector<float> values(view["byteLength"].get<size_t>() / sizeof(float));
+    std::memcpy(values.data(), bytes.data() + 28 + json_bytes + view["byteOffset"].get<size_t>(),
+                values.size() * sizeof(float));
+    return values;
+  };
+  EXPECT_NEAR(double(floats("SCALE")[4]), made.splats[1].scale[1], 1e-5);
+  EXPECT_NEAR(double(floats("ROTATION")[3]), made.splats[0].rotation[0], 1e-6);
+  EXPECT_NEAR(double(floats("OPACITY")[2]), made.splats[2].opacity, 1e-6);
+  EXPECT_NEAR(double(floats("SH_DEGREE_0_COEF_0")[5]), made.splats[1].coefficient[2], 1e-5);
+  EXPECT_NEAR(double(floats("SH_DEGREE_2_COEF_1")[4]), made.splats[1].sh[3 * 4 + 1], 1.3e-4);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ maq::Splats splats_of(const MadeSplats& made) {
   return splats;
 }
 
-PinholeCamera camera_at(Vec3 eye, Vec3 target, int width_px = 96, int height_px = 64, double focal_px = 70) {
+PinholeCamera splat_camera_at(Vec3 eye, Vec3 target, int width_px = 96, int height_px = 64, double focal_px = 70) {
   const Vec3 forward = maq::normalized(target - eye);
   const Vec3 right =
       maq::normalized(maq::any_orthogonal(forward) + 0.3 * maq::cross(forward, maq::any_orthogonal(forward)));
@@ -56,7 +56,8 @@ struct ReferenceSplat {
 };
 
 // Kerbl et al. 2023, section 4, as it is written there.
-bool project(const MadeSplat& splat, int degree, const PinholeCamera& camera, bool is_antialiased, ReferenceSplat& to) {
+bool project_splat(const MadeSplat& splat, int degree, const PinholeCamera& camera, bool is_antialiased,
+                   ReferenceSplat& to) {
   const double* const r = camera.rotation.data();
   double away[3], at[3] = {}, m[3][3], covariance[3][3] = {};
   for (size_t k = 0; k < 3; ++k) away[k] = splat.position[k] - camera.centre[k];
@@ -137,11 +138,11 @@ struct ReferenceImage {
   std::vector<double> rgb, alpha, depth;
 };
 
-ReferenceImage reference(const MadeSplats& made, const PinholeCamera& camera, bool is_antialiased = false) {
+ReferenceImage reference_image(const MadeSplats& made, const PinholeCamera& camera, bool is_antialiased = false) {
   std::vector<ReferenceSplat> splats;
   for (const MadeSplat& splat : made.splats) {
     ReferenceSplat projected{};
-    if (project(splat, made.degree, camera, is_antialiased, projected)) splats.push_back(projected);
+    if (project_splat(splat, made.degree, camera, is_antialiased, projected)) splats.push_back(projected);
   }
   std::stable_sort(splats.begin(), splats.end(),
                    [](const ReferenceSplat& a, const ReferenceSplat& b) { return a.depth < b.depth; });
@@ -166,7 +167,7 @@ ReferenceImage reference(const MadeSplats& made, const PinholeCamera& camera, bo
   return image;
 }
 
-RenderedImage rendered(const maq::Splats& splats, const PinholeCamera& camera, int threads = 2) {
+RenderedImage rendered_splats(const maq::Splats& splats, const PinholeCamera& camera, int threads = 2) {
   SplatRenderOptions options;
   options.threads = threads;
   SplatRenderer renderer(splats, options);
@@ -179,8 +180,8 @@ RenderedImage rendered(const maq::Splats& splats, const PinholeCamera& camera, i
 void expect_reference(const MadeSplats& made, const PinholeCamera& camera, bool is_antialiased = false) {
   maq::Splats splats = splats_of(made);
   splats.is_antialiased = is_antialiased;
-  const RenderedImage image = rendered(splats, camera);
-  const ReferenceImage wanted = reference(made, camera, is_antialiased);
+  const RenderedImage image = rendered_splats(splats, camera);
+  const ReferenceImage wanted = reference_image(made, camera, is_antialiased);
   double sum = 0, covered = 0;
   for (size_t i = 0; i < wanted.alpha.size(); ++i) {
     for (size_t c = 0; c < 3; ++c) {
@@ -203,8 +204,8 @@ void expect_reference(const MadeSplats& made, const PinholeCamera& camera, bool 
 TEST(SplatRendering, IsThatOfAPlainRendererInDoublePrecision) {
   for (int degree = 0; degree <= 3; ++degree) {
     const MadeSplats made = made_splats(700, degree, unsigned(10 + degree));
-    expect_reference(made, camera_at({2.5, -0.7, 1}, {0, 0, 0}));
-    expect_reference(made, camera_at({-0.4, 0.2, -2}, {0.2, 0, 0.1}, 67, 81, 90));
+    expect_reference(made, splat_camera_at({2.5, -0.7, 1}, {0, 0, 0}));
+    expect_reference(made, splat_camera_at({-0.4, 0.2, -2}, {0.2, 0, 0.1}, 67, 81, 90));
   }
 }
 
@@ -213,39 +214,39 @@ TEST(SplatRendering, FaintsWhatIsSmallerThanAPixelIfSplatsWereTrainedSo) {
   for (MadeSplat& splat : made.splats) {
     for (double& scale : splat.scale) scale *= 0.2;
   }
-  expect_reference(made, camera_at({2.5, -0.7, 1}, {0, 0, 0}), true);
+  expect_reference(made, splat_camera_at({2.5, -0.7, 1}, {0, 0, 0}), true);
 }
 
 TEST(SplatRendering, ACameraAmongTheSplatsSeesThemAsTheReferenceDoes) {
   const MadeSplats made = made_splats(900, 1, 5);
-  expect_reference(made, camera_at({0.1, 0.05, -0.1}, {1, 0.3, 0}));
+  expect_reference(made, splat_camera_at({0.1, 0.05, -0.1}, {1, 0.3, 0}));
   // At the very place of a splat.
   const auto& at = made.splats[17].position;
-  expect_reference(made, camera_at({at[0], at[1], at[2]}, {0, 0, 0}));
+  expect_reference(made, splat_camera_at({at[0], at[1], at[2]}, {0, 0, 0}));
 }
 
 TEST(SplatRendering, ThinAndLongOnesAreNotLost) {
   MadeSplats made = made_splats(400, 0, 6);
   for (size_t i = 0; i < made.splats.size(); ++i) made.splats[i].scale = {0.4, 0.4e-3, i % 2 == 0 ? 0.4e-3 : 0.05};
-  expect_reference(made, camera_at({3, 0.5, 0.4}, {0, 0, 0}));
-  expect_reference(made, camera_at({1.2, 0.1, 0}, {0, 0, 0}, 128, 128, 110));
+  expect_reference(made, splat_camera_at({3, 0.5, 0.4}, {0, 0, 0}));
+  expect_reference(made, splat_camera_at({1.2, 0.1, 0}, {0, 0, 0}, 128, 128, 110));
 }
 
 TEST(SplatRendering, TheUnitAndTheDistanceToTheOriginDoNotMatter) {
   for (const double size : {1e-3, 1e6}) {
-    expect_reference(made_splats(300, 2, 7, size), camera_at({2.5 * size, 0, size}, {0, 0, 0}));
+    expect_reference(made_splats(300, 2, 7, size), splat_camera_at({2.5 * size, 0, size}, {0, 0, 0}));
   }
   const double away = 1e6;
   expect_reference(made_splats(300, 2, 8, 1, {away, -away, away}),
-                   camera_at({away + 2.5, -away + 0.3, away}, {away, -away, away}));
+                   splat_camera_at({away + 2.5, -away + 0.3, away}, {away, -away, away}));
 }
 
 TEST(SplatRendering, ImagesOfEverySizeAreRight) {
   const MadeSplats made = made_splats(200, 0, 9);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(31, 33), std::pair(150, 2), std::pair(2, 150)}) {
-    const PinholeCamera camera = camera_at({2, 0, 0.3}, {0, 0, 0}, width, height, 60);
-    const RenderedImage image = rendered(splats_of(made), camera);
-    const ReferenceImage wanted = reference(made, camera);
+    const PinholeCamera camera = splat_camera_at({2, 0, 0.3}, {0, 0, 0}, width, height, 60);
+    const RenderedImage image = rendered_splats(splats_of(made), camera);
+    const ReferenceImage wanted = reference_image(made, camera);
     ASSERT_EQ(image.alpha.size(), wanted.alpha.size());
     for (size_t i = 0; i < wanted.alpha.size(); ++i) ASSERT_NEAR(double(image.alpha[i]), 255 * wanted.alpha[i], 3.5);
   }
@@ -255,10 +256,10 @@ TEST(SplatRendering, TheImageIsTheSameWithAnyNumberOfThreads) {
   MadeSplats made = made_splats(5000, 3, 12);
   for (size_t i = 0; i < 2000; ++i) made.splats.push_back(made.splats[i % 50]);  // of equal depth
   const maq::Splats splats = splats_of(made);
-  const PinholeCamera camera = camera_at({2, 0.4, 0.3}, {0, 0, 0}, 200, 150, 120);
-  const RenderedImage one = rendered(splats, camera, 1);
+  const PinholeCamera camera = splat_camera_at({2, 0.4, 0.3}, {0, 0, 0}, 200, 150, 120);
+  const RenderedImage one = rendered_splats(splats, camera, 1);
   for (const int threads : {2, 3, 7}) {
-    const RenderedImage more = rendered(splats, camera, threads);
+    const RenderedImage more = rendered_splats(splats, camera, threads);
     EXPECT_EQ(one.bgr, more.bgr);
     EXPECT_EQ(one.alpha, more.alpha);
     EXPECT_EQ(one.depth, more.depth);
@@ -270,7 +271,7 @@ TEST(SplatRendering, AViewWithoutSplatsIsTheBackground) {
   options.background = {10, 20, 30};
   SplatRenderer renderer(splats_of(made_splats(100, 1)), options);
   RenderedImage image;
-  const maq::SplatRenderCounts counts = renderer.render(camera_at({20, 0, 0}, {40, 0, 0}), image);
+  const maq::SplatRenderCounts counts = renderer.render(splat_camera_at({20, 0, 0}, {40, 0, 0}), image);
   EXPECT_EQ(counts.drawn_splats, 0u);
   for (size_t i = 0; i < image.alpha.size(); ++i) {
     ASSERT_EQ(image.alpha[i], 0);
@@ -283,7 +284,7 @@ TEST(SplatRendering, AViewWithoutSplatsIsTheBackground) {
 TEST(SplatRendering, SplatsThatNoPixelShowsAreNoScene) {
   MadeSplats made = made_splats(10, 0);
   for (MadeSplat& splat : made.splats) splat.opacity = 0.003;
-  const RenderedImage image = rendered(splats_of(made), camera_at({2, 0, 0}, {0, 0, 0}));
+  const RenderedImage image = rendered_splats(splats_of(made), splat_camera_at({2, 0, 0}, {0, 0, 0}));
   EXPECT_EQ(*std::max_element(image.alpha.begin(), image.alpha.end()), 0);
 }
 
@@ -292,7 +293,7 @@ TEST(SplatRendering, SplatsNearerThanAskedForAreLeftOut) {
   made.splats[0].position = {0, 0, 0};
   made.splats[0].scale = {0.1, 0.1, 0.1};
   made.splats[0].opacity = 0.9;
-  const PinholeCamera camera = camera_at({2, 0, 0}, {0, 0, 0});
+  const PinholeCamera camera = splat_camera_at({2, 0, 0}, {0, 0, 0});
   for (const double near : {1.9, 2.1}) {
     SplatRenderOptions options;
     options.near = near;
@@ -310,7 +311,7 @@ TEST(SplatRendering, HugeTinyAndManyLayersStayFiniteAndBounded) {
     if (i % 5 == 0) made.splats[i].position[i % 3] *= 1e9;
   }
   for (const Vec3 eye : {Vec3{2, 0, 0}, Vec3{0, 0, 0}, Vec3{1e6, 1e6, 0}}) {
-    const RenderedImage image = rendered(splats_of(made), camera_at(eye, {0.1, 0, 0.2}));
+    const RenderedImage image = rendered_splats(splats_of(made), splat_camera_at(eye, {0.1, 0, 0.2}));
     for (const float depth : image.depth) ASSERT_TRUE(std::isfinite(depth) && depth >= 0);
   }
 }
@@ -320,9 +321,9 @@ TEST(SplatRendering, OptionsAndCamerasAreChecked) {
   SplatRenderOptions options;
   options.near = std::numeric_limits<double>::quiet_NaN();
   expect_error(MAQ_ERROR_INVALID_ARGUMENT, "finite", [&] { SplatRenderer(splats, options); });
-  PinholeCamera camera = camera_at({2, 0, 0}, {0, 0, 0});
+  PinholeCamera camera = splat_camera_at({2, 0, 0}, {0, 0, 0});
   camera.fx_px = 0;
-  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "camera", [&] { rendered(splats, camera); });
+  expect_error(MAQ_ERROR_INVALID_ARGUMENT, "camera", [&] { rendered_splats(splats, camera); });
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ MAY_INCLUDE = {
     "scene/fusion": FUSED - {"nn"},
     "scene/assembly": SEEN | {"scene/fusion"},
     "scene/render": SEEN - {"scene/capture"},
-    "scene/splats": CAPTURE - {"nn"} | {"scene/capture"},
+    "scene/splats": CAPTURE - {"nn"} | {"scene/capture", "scene/format"},
     "sources": BACKEND | {"sources/android", "sources/v4l2", "sources/libcamera", "sources/depthai",
                           "sources/recording", "sources/files", "sources/synthetic"},
     "sources/android": BACKEND,
@@ -163,7 +163,6 @@ DEFENDED = {
     "head/fit/adam": "an algorithm of the literature, with a test of its own",
     "head/fit/pose_rays": "geometry with a test of its own, against finite differences",
     "prediction/transformer/philox": "an algorithm of the literature with a test of its own",
-    "scene/splats/spz_format": "the bytes of a file format, for reader and writer",
     "scene/render/refiner_roi": "geometry with tests of its own, against every pixel that the refiner reads",
 }
 

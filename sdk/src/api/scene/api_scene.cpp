@@ -2,8 +2,10 @@
 
 #include "api/boundary.h"
 #include "api/scene/scene_handles.h"
+#include "core/worker_threads.h"
 #include "scene/format/ply_writer.h"
 #include "scene/format/scene_file.h"
+#include "scene/splats/splat_discs.h"
 #include "scene/splats/splat_files.h"
 
 using namespace maq;
@@ -14,7 +16,7 @@ namespace {
 void require_points(const maq_scene& scene) {
   if (scene.splats) {
     throw Error(MAQ_ERROR_UNSUPPORTED,
-                "The scene was opened from a file of splats, which cannot be written as points; use that file.");
+                "The scene has splats, which cannot be written as points; write them to a .ply, .spz or .glb file.");
   }
 }
 
@@ -76,8 +78,13 @@ maq_status maq_scene_save(const maq_scene* scene, const char* path) {
   return guarded(scene, __func__, [&] {
     require_argument(scene, "scene");
     require_argument(path, "path");
-    require_points(*scene);
-    write_scene_file(scene->scene, path);
+    if (is_name_of_splats(path)) {
+      WorkerThreads threads(default_threads());
+      write_splat_file(scene->splats ? *scene->splats : splats_of_points(scene->scene, threads), path);
+    } else {
+      require_points(*scene);
+      write_scene_file(scene->scene, path);
+    }
     return MAQ_OK;
   });
 }

@@ -20,8 +20,9 @@ struct maq_capture : maq::HandleOf<maq::HandleKind::kCapture> {
 struct maq_scene : maq::HandleOf<maq::HandleKind::kScene> {
   explicit maq_scene(maq::Scene made, const std::optional<maq_scene_build_stats>& stats = {})
       : scene(std::move(made)), build_stats(stats) {}
-  explicit maq_scene(maq::Splats read) : splats(std::make_shared<const maq::Splats>(std::move(read))) {}
+  explicit maq_scene(maq::Splats made, const std::optional<maq_scene_build_stats>& stats = {})
+      : splats(std::make_shared<const maq::Splats>(std::move(made))), build_stats(stats) {}
   maq::Scene scene;                                  // empty for splats
-  std::shared_ptr<const maq::Splats> splats;         // from a file of splats; otherwise null
+  std::shared_ptr<const maq::Splats> splats;         // otherwise null
   std::optional<maq_scene_build_stats> build_stats;  // nothing for scenes from files
 };

@@ -9,7 +9,7 @@
 namespace maq {
 namespace {
 
-constexpr size_t kPlanes = 3 + kAxesPlanes + 1 + 3;
+constexpr size_t kOpacityPlane = 3 + kAxesPlanes, kColourPlane = kOpacityPlane + 1, kPlanes = kColourPlane + 3;
 constexpr float kMinOpacity = 1.0f / 255;
 // A pixel shows a splat up to there, in standard deviations: 2 ln 255 is 3.33 squared.
 constexpr float kMaxReach = 3.34f;
@@ -66,11 +66,10 @@ std::array<float, 9> matrix_of(const float* q) {
 
 }  // namespace
 
-SplatChunks::SplatChunks(const Splats& splats) : sh_degree_(splats.sh_degree), is_antialiased_(splats.is_antialiased) {
-  const std::vector<uint32_t> order = order_in_space(splats);
-  const size_t count = order.size(), terms = size_t(sh_terms(sh_degree_));
+SplatChunks::SplatChunks(const Splats& splats)
+    : sh_degree_(splats.sh_degree), is_antialiased_(splats.is_antialiased), order_(order_in_space(splats)) {
+  const size_t count = order_.size(), terms = size_t(sh_terms(sh_degree_));
   const size_t chunk_count = divide_up<size_t>(count, kChunkSplats);
-  count_ = count;
   numbers_.assign(chunk_count * kPlanes * kChunkSplats, 0.0f);
   sh_.assign(chunk_count * terms * 3 * kChunkSplats, int16_t(0));
   chunks_.resize(chunk_count);
@@ -78,41 +77,47 @@ SplatChunks::SplatChunks(const Splats& splats) : sh_degree_(splats.sh_degree), i
     SplatChunk& chunk = chunks_[c];
     const size_t first = c * kChunkSplats;
     chunk.count = uint32_t(std::min<size_t>(kChunkSplats, count - first));
-    float* const planes = numbers_.data() + c * kPlanes * kChunkSplats;
+    const float* const planes = numbers_.data() + c * kPlanes * kChunkSplats;
     int16_t* const sh = sh_.data() + c * terms * 3 * kChunkSplats;
     const auto plane = [&](size_t k) { return planes + k * kChunkSplats; };
     for (size_t axis = 0; axis < 3; ++axis) {
       chunk.position[axis] = plane(axis);
-      chunk.colour[axis] = plane(3 + kAxesPlanes + 1 + axis);
-      float low = splats.position[3 * size_t(order[first]) + axis], high = low;
+      chunk.colour[axis] = plane(kColourPlane + axis);
+      float low = splats.position[3 * size_t(order_[first]) + axis], high = low;
       for (size_t i = 0; i < chunk.count; ++i) {
-        const float value = splats.position[3 * size_t(order[first + i]) + axis];
+        const float value = splats.position[3 * size_t(order_[first + i]) + axis];
         low = std::min(low, value);
         high = std::max(high, value);
       }
       chunk.centre[axis] = splats.origin[axis] + (double(low) + double(high)) / 2;
     }
     for (size_t k = 0; k < kAxesPlanes; ++k) chunk.axes[k] = plane(3 + k);
-    chunk.log_opacity = plane(3 + kAxesPlanes);
+    chunk.log_opacity = plane(kOpacityPlane);
     chunk.sh = sh;
     for (size_t i = 0; i < chunk.count; ++i) {
-      const size_t from = order[first + i];
-      float distance = 0;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double world = splats.origin[axis] + double(splats.position[3 * from + axis]);
-        const float local = float(world - chunk.centre[axis]);
-        plane(axis)[i] = local;
-        distance += local * local;
-        plane(3 + kAxesPlanes + 1 + axis)[i] = splats.colour[3 * from + axis];
-      }
-      const float* const scale = &splats.scale[3 * from];
-      chunk.radius = std::max(chunk.radius, std::sqrt(distance) + kMaxReach * std::max({scale[0], scale[1], scale[2]}));
-      const std::array<float, 9> rotation = matrix_of(&splats.rotation[4 * from]);
-      for (size_t k = 0; k < kAxesPlanes; ++k) plane(3 + k)[i] = rotation[k] * scale[k % 3];
-      plane(3 + kAxesPlanes)[i] = std::log(splats.opacity[from]);
+      const size_t from = order_[first + i];
+      set(uint32_t(first + i), splat_at(splats, from));
       for (size_t k = 0; k < 3 * terms; ++k) sh[k * kChunkSplats + i] = splats.sh[3 * terms * from + k];
     }
   }
+}
+
+void SplatChunks::set(uint32_t place, const Splat& splat) {
+  SplatChunk& chunk = chunks_[place / kChunkSplats];
+  float* const numbers = numbers_.data() + place / kChunkSplats * kPlanes * kChunkSplats + place % kChunkSplats;
+  const auto plane = [&](size_t k) -> float& { return numbers[k * kChunkSplats]; };
+  float distance = 0;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto local = float(splat.position[axis] - chunk.centre[axis]);
+    plane(axis) = local;
+    distance += local * local;
+    plane(kColourPlane + axis) = splat.colour[axis];
+  }
+  const std::array<float, 3>& scale = splat.scale;
+  chunk.radius = std::max(chunk.radius, std::sqrt(distance) + kMaxReach * std::max({scale[0], scale[1], scale[2]}));
+  const std::array<float, 9> rotation = matrix_of(splat.rotation.data());
+  for (size_t k = 0; k < kAxesPlanes; ++k) plane(3 + k) = rotation[k] * scale[k % 3];
+  plane(kOpacityPlane) = std::log(splat.opacity);
 }
 
 }  // namespace maq

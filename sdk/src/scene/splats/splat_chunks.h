@@ -33,12 +33,17 @@ class SplatChunks {
   const std::vector<SplatChunk>& chunks() const { return chunks_; }
   int sh_degree() const { return sh_degree_; }
   bool is_antialiased() const { return is_antialiased_; }
-  uint64_t count() const { return count_; }
+  uint64_t count() const { return order_.size(); }
+
+  // The splat at each place: chunk after chunk, kChunkSplats places each.
+  const std::vector<uint32_t>& order() const { return order_; }
+  // Changes the numbers of a place, but not the harmonics.
+  void set(uint32_t place, const Splat& splat);
 
  private:
   int sh_degree_;
   bool is_antialiased_;
-  uint64_t count_ = 0;
+  std::vector<uint32_t> order_;
   std::vector<float> numbers_;
   std::vector<int16_t> sh_;
   std::vector<SplatChunk> chunks_;

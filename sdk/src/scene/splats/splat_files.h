@@ -1,4 +1,4 @@
-// Splats from files of other programs: 3DGS .ply and .spz.
+// Splats from and to files of other programs.
 #pragma once
 
 #include <string>
@@ -23,5 +23,17 @@ Splats read_splat_ply(const std::string& path);
 // SPZ by Niantic, versions 2 and 3 (https://github.com/nianticlabs/spz). Positions are not converted. Harmonics
 // of degree 4 are skipped.
 Splats read_spz(const std::string& path);
+
+// Whether a file of that name holds splats: it ends with .ply, .spz or .glb.
+bool is_name_of_splats(const std::string& path);
+
+// Writes the kind of file that the extension tells: .ply as read_splat_ply() reads it, .spz of version 3, or .glb, glTF
+// with KHR_gaussian_splatting. Replaces a file of that name atomically. Throws MAQ_ERROR_UNWRITABLE; then an older file
+// is as it was. Throws MAQ_ERROR_UNSUPPORTED for coordinates that 24 bits of an SPZ file cannot hold.
+void write_splat_file(const Splats& splats, const std::string& path);
+
+// The bytes of such files.
+std::vector<uint8_t> spz_of(const Splats& splats);
+std::vector<uint8_t> glb_of(const Splats& splats);
 
 }  // namespace maq

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/rounding.h"
 #include "core/simd_clones.h"
 
 namespace maq {
@@ -16,7 +15,7 @@ constexpr float kPixelVariance = 0.3f;
 constexpr double kLinearMargin = 0.15;
 constexpr float kMinDepth = 1e-6f;
 constexpr float kLog2E = 1.44269504f, kHalfLog2E = kLog2E / 2;
-constexpr float kFarthestPx = 1e6f;
+constexpr float kFarthestSplatPx = 1e6f;
 
 // The splats of a chunk as ellipses, before those outside of the image are dropped.
 struct ChunkProjection {
@@ -27,8 +26,8 @@ struct ChunkProjection {
   float rgb[3][kChunkSplats];
 };
 
-// `count` may be rounded up: chunks have zeros behind their end.
-inline void project_lanes(const SplatView::Parameters& given, const float* offset, const SplatChunk& chunk, int count,
+// All places, since chunks have zeros behind their end: loops of a constant length are half the code.
+inline void project_lanes(const SplatView::Parameters& given, const float* offset, const SplatChunk& chunk,
                           ChunkProjection& __restrict to) {
   const float* const px = chunk.position[0];
   const float* const py = chunk.position[1];
@@ -44,7 +43,7 @@ inline void project_lanes(const SplatView::Parameters& given, const float* offse
   const float* const m8 = chunk.axes[8];
   const SplatView::Parameters by = given;  // no write below changes it
   const float* const r = by.rotation;
-  for (int i = 0; i < count; ++i) {
+  for (int i = 0; i < kChunkSplats; ++i) {
     const float wx = offset[0] + px[i], wy = offset[1] + py[i], wz = offset[2] + pz[i];
     const float cx = r[0] * wx + r[1] * wy + r[2] * wz;
     const float cy = r[3] * wx + r[4] * wy + r[5] * wz;
@@ -87,17 +86,16 @@ inline void project_lanes(const SplatView::Parameters& given, const float* offse
 }
 
 MAQ_SIMD_CLONES void project_chunk(const SplatView::Parameters& by, const float* offset, const SplatChunk& chunk,
-                                   int count, ChunkProjection& to) {
-  project_lanes(by, offset, chunk, count, to);
+                                   ChunkProjection& to) {
+  project_lanes(by, offset, chunk, to);
 }
 
 // Colours in the directions from the camera (the harmonics of Sloan 2008, with the signs of Kerbl et al.).
-MAQ_SIMD_CLONES void shade_chunk(const float* offset, const SplatChunk& chunk, int degree, int count,
-                                 ChunkProjection& to) {
+MAQ_SIMD_CLONES void shade_chunk(const float* offset, const SplatChunk& chunk, int degree, ChunkProjection& to) {
   for (int channel = 0; channel < 3; ++channel) {
     const float* const colour = chunk.colour[channel];
     float* const rgb = to.rgb[channel];
-    for (int i = 0; i < count; ++i) rgb[i] = colour[i];
+    for (int i = 0; i < kChunkSplats; ++i) rgb[i] = colour[i];
   }
   if (degree > 0) {
     float basis[kMaxShTerms][kChunkSplats];
@@ -105,11 +103,11 @@ MAQ_SIMD_CLONES void shade_chunk(const float* offset, const SplatChunk& chunk, i
     const float* const py = chunk.position[1];
     const float* const pz = chunk.position[2];
     float inverse_length[kChunkSplats];
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < kChunkSplats; ++i) {
       const float x = offset[0] + px[i], y = offset[1] + py[i], z = offset[2] + pz[i];
       inverse_length[i] = 1 / std::sqrt(std::max(x * x + y * y + z * z, 1e-30f));
     }
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < kChunkSplats; ++i) {
       float x = offset[0] + px[i], y = offset[1] + py[i], z = offset[2] + pz[i];
       const float inverse = inverse_length[i];
       x *= inverse, y *= inverse, z *= inverse;
@@ -136,7 +134,7 @@ MAQ_SIMD_CLONES void shade_chunk(const float* offset, const SplatChunk& chunk, i
         const int16_t* const sh = chunk.sh + (3 * term + channel) * kChunkSplats;
         const float* const along = basis[term];
         float* const rgb = to.rgb[channel];
-        for (int i = 0; i < count; ++i) rgb[i] += along[i] * (kShStep * float(sh[i]));
+        for (int i = 0; i < kChunkSplats; ++i) rgb[i] += along[i] * (kShStep * float(sh[i]));
       }
     }
   }
@@ -184,12 +182,12 @@ bool SplatView::may_show(const SplatChunk& chunk) const {
   });
 }
 
-int SplatView::project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* projected) const {
+int SplatView::project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* projected, uint8_t* places) const {
   ChunkProjection to;
   float offset[3];
   for (size_t i = 0; i < 3; ++i) offset[i] = float(chunk.centre[i] - centre_[i]);
   const int count = int(chunk.count);
-  project_chunk(by_, offset, chunk, round_up(count, 16), to);
+  project_chunk(by_, offset, chunk, to);
   uint16_t seen[kChunkSplats];
   int seen_count = 0;
   for (int i = 0; i < count; ++i) {
@@ -205,9 +203,10 @@ int SplatView::project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* p
                 right = std::min(std::floor(to.x[i] + half_width), by_.width - 1),
                 top = std::max(std::ceil(to.y[i] - half_height), 0.0f),
                 bottom = std::min(std::floor(to.y[i] + half_height), by_.height - 1);
-    const bool is_seen = left <= right && top <= bottom && half_width < kFarthestPx && half_height < kFarthestPx &&
-                         to.curvature[i] > 0 && std::abs(to.slope[i]) < kFarthestPx &&
-                         std::abs(to.x[i]) < kFarthestPx && std::abs(to.y[i]) < kFarthestPx;
+    const bool is_seen = left <= right && top <= bottom && half_width < kFarthestSplatPx &&
+                         half_height < kFarthestSplatPx && to.curvature[i] > 0 &&
+                         std::abs(to.slope[i]) < kFarthestSplatPx && std::abs(to.x[i]) < kFarthestSplatPx &&
+                         std::abs(to.y[i]) < kFarthestSplatPx;
     if (!is_seen) continue;
     ProjectedSplat& splat = projected[seen_count];
     splat = {to.x[i],
@@ -220,10 +219,11 @@ int SplatView::project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* p
              to.depth[i],
              {uint16_t(int(left) / kTileWidth_px), uint16_t(int(top) / kTileHeight_px),
               uint16_t(int(right) / kTileWidth_px + 1), uint16_t(int(bottom) / kTileHeight_px + 1)}};
+    if (places != nullptr) places[seen_count] = uint8_t(i);
     seen[seen_count++] = uint16_t(i);
   }
   if (seen_count == 0) return 0;
-  shade_chunk(offset, chunk, sh_degree, round_up(count, 16), to);
+  shade_chunk(offset, chunk, sh_degree, to);
   for (int k = 0; k < seen_count; ++k) {
     for (int channel = 0; channel < 3; ++channel) projected[k].rgb[channel] = std::max(to.rgb[channel][seen[k]], 0.0f);
   }

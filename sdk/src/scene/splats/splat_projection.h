@@ -39,8 +39,8 @@ class SplatView {
   bool may_show(const SplatChunk& chunk) const;
 
   // Writes the splats of the chunk that the image shows, in their order, and returns how many these are. `projected`
-  // has room for kChunkSplats.
-  int project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* projected) const;
+  // has room for kChunkSplats, as has `places`, if it is there, which gets the splats' places in the chunk.
+  int project(const SplatChunk& chunk, int sh_degree, ProjectedSplat* projected, uint8_t* places = nullptr) const;
 
   struct Parameters {
     float rotation[9];  // row by row: world to camera
@@ -50,6 +50,7 @@ class SplatView {
     float width, height;
     bool is_antialiased;
   };
+  const Parameters& parameters() const { return by_; }
 
  private:
   Parameters by_{};

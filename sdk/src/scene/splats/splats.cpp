@@ -51,6 +51,18 @@ int16_t sh_steps(double coefficient) {
   return int16_t(std::lround(std::clamp(coefficient / double(kShStep), -32767.0, 32767.0)));
 }
 
+Splat splat_at(const Splats& splats, size_t index) {
+  Splat splat;
+  for (size_t k = 0; k < 3; ++k) {
+    splat.position[k] = splats.origin[k] + double(splats.position[3 * index + k]);
+    splat.scale[k] = splats.scale[3 * index + k];
+    splat.colour[k] = splats.colour[3 * index + k];
+  }
+  for (size_t k = 0; k < 4; ++k) splat.rotation[k] = splats.rotation[4 * index + k];
+  splat.opacity = splats.opacity[index];
+  return splat;
+}
+
 std::array<std::array<double, 3>, 2> bounds_of(const Splats& splats) {
   std::array<std::array<double, 3>, 2> box = {splats.origin, splats.origin};
   for (size_t i = 0; i < splats.position.size(); ++i) {

@@ -50,6 +50,9 @@ struct Splats {
 // Returns the coefficient in steps of kShStep; larger ones are cut. NaN becomes 0.
 int16_t sh_steps(double coefficient);
 
+// One of them, whose rotation has length 1; without its harmonics.
+Splat splat_at(const Splats& splats, size_t index);
+
 // The box of all middles, in the world: low, then high.
 std::array<std::array<double, 3>, 2> bounds_of(const Splats& splats);
 

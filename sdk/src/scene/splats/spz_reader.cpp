@@ -65,7 +65,7 @@ std::array<float, 4> smallest_three(const uint8_t* bytes) {
   return q;
 }
 
-double coordinate(const uint8_t* bytes, double step) {
+double spz_coordinate(const uint8_t* bytes, double step) {
   const uint32_t low = uint32_t(bytes[0]) | uint32_t(bytes[1]) << 8 | uint32_t(bytes[2]) << 16;
   return double(int32_t(low << 8) >> 8) * step;
 }
@@ -98,7 +98,7 @@ Splats read_spz(const std::string& path) {
   for (size_t i = 0; i < count; ++i) {
     Splat splat;
     for (size_t axis = 0; axis < 3; ++axis) {
-      splat.position[axis] = coordinate(&positions[9 * i + 3 * axis], step);
+      splat.position[axis] = spz_coordinate(&positions[9 * i + 3 * axis], step);
       splat.scale[axis] = std::exp(float(scales[3 * i + axis]) / kSpzScaleSteps - kSpzScaleOffset);
       splat.colour[axis] = 0.5f + (float(colours[3 * i + axis]) / 255 - 0.5f) * (kShConstant / kSpzColourScale);
     }

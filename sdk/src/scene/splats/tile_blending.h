@@ -19,4 +19,15 @@ struct TileSums {
 uint32_t blend_tile(const ProjectedSplat* splats, const uint32_t* begin, const uint32_t* end, int left_px, int top_px,
                     TileSums& sums);
 
+// The change of a loss by the numbers of a ProjectedSplat.
+struct SplatGradient {
+  float log_opacity, curvature, slope, falloff, x, y, rgb[3];
+};
+
+// The gradients of a loss, for each splat of a list that blend_tile() blended: `loss` has its change by red, green and
+// blue of each pixel, `sums` what blend_tile() left. `sums` is changed. (The chain rule through the blending, from
+// front to back: what lies behind a splat is what the pixel has in all, less what lies before it.)
+void tile_gradients(const ProjectedSplat* splats, const uint32_t* begin, const uint32_t* end, int left_px, int top_px,
+                    const float loss[3][kTilePixels], TileSums& sums, SplatGradient* gradients);
+
 }  // namespace maq

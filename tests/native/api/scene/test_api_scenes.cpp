@@ -113,6 +113,25 @@ TEST_F(ApiScenes, SplatsOfOtherProgramsAreOpenedAndRenderedWithoutABundle) {
   EXPECT_EQ(open(folder_.file("points.ply")), MAQ_ERROR_UNSUPPORTED);
 }
 
+TEST_F(ApiScenes, PointsAreSavedAsSplatsThatShowTheSame) {
+  for (const char* extension : {".ply", ".spz"}) {
+    scene_.save(folder_.file(std::string("ball") + extension));
+    const maquette::Scene splats(context_, folder_.file(std::string("ball") + extension));
+    EXPECT_EQ(splats.info().point_count, scene_.info().point_count);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(splats.info().bounds_min[axis], -1, 0.2);
+    maquette::SceneRenderer renderer(context_, maquette::default_scene_renderer_config(), splats);
+    const maquette::Image image = renderer.run(api_tiny_scene::camera_at(0.3, 100, 80));
+    size_t stride = 0;
+    const auto* const alpha = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_ALPHA, &stride));
+    const auto* const depth = static_cast<const float*>(image.plane(MAQ_IMAGE_PLANE_DEPTH, &stride));
+    EXPECT_GT(alpha[40 * 100 + 50], 200);
+    EXPECT_NEAR(double(depth[40 * 100 + 50]), 2, 0.15) << "a ball of radius 1, seen from 3 away";
+    EXPECT_EQ(alpha[0], 0);
+    splats.save(folder_.file("again.glb"));
+    EXPECT_EQ(read_text(folder_.file("again.glb")).substr(0, 4), "glTF");
+  }
+}
+
 TEST_F(ApiScenes, SeveralThreadsUseOneScene) {
   const maquette::Scene opened(context_, path());
   std::vector<std::thread> threads;

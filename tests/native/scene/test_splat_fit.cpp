@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/math/rotation.h"
+#include "scene/splats/splat_holes.h"
 #include "scene/splats/splat_renderer.h"
 #include "scene/splats/tile_blending.h"
 #include "support/expect_error.h"
@@ -77,10 +78,13 @@ TEST(SplatFit, ASplatThatEndsBetweenTheLastPixelsOfATileStaysInIt) {
     maq::TileSums sums;
     float behind[64];
   } memory{};
-  const uint32_t list[] = {0};
-  for (float edge = 31.9f; edge < 32.1f; edge = std::nextafter(edge, 33.0f)) {
-    const ProjectedSplat splat = ellipse_of_pixels(edge - 10, 15, (maq::kMaxFalloff - 0.1f) / 100, 0, 1e-6f, -0.1f, 2);
-    maq::blend_tile(&splat, list, list + 1, 0, 0, memory.sums);
+  const uint32_t list[] = {0, 1};
+  for (float edge = 31.99f; edge < 32.01f; edge = std::nextafter(edge, 33.0f)) {
+    // The first one gives the first pixels of the sums, which are behind the last, a value.
+    const ProjectedSplat splats[] = {
+        ellipse_of_pixels(3, 0, 0.01f, 0, 0.1f, -1, 1),
+        ellipse_of_pixels(edge - 10, 15, (maq::kMaxFalloff - 0.1f) / 100, 0, 1e-6f, -0.1f, 2)};
+    maq::blend_tile(splats, list, list + 2, 0, 0, memory.sums);
     for (const float value : memory.before) ASSERT_EQ(value, 0);
     for (const float value : memory.behind) ASSERT_EQ(value, 0);
   }
@@ -163,6 +167,30 @@ TEST(SplatFit, InvalidPixelsDoNotCount) {
   maq::SplatFitOptions options;
   options.max_steps = 6;
   EXPECT_LT(maq::fit_splats(splats, photos, options).first, 1e-4);
+}
+
+TEST(SplatFit, HolesAreFilledWithWhatThePhotosShow) {
+  const maq::Splats truth = wall_of_splats();
+  const std::vector<maq::FitPhoto> photos = photos_of_splats(truth);
+  maq::Splats splats;
+  for (size_t i = 0; i < truth.count(); ++i) {
+    const maq::Splat splat = maq::splat_at(truth, i);
+    if (std::abs(splat.position[0]) > 0.5 || std::abs(splat.position[1]) > 0.5) {
+      EXPECT_TRUE(splats.add(splat));
+    }
+  }
+  maq::SplatFitOptions options;
+  options.max_steps = 6;
+  maq::Splats with_hole = splats;
+  const double before = maq::fit_splats(with_hole, photos, options).first;
+  const size_t count = splats.count(), added = maq::fill_holes(splats, photos, 2);
+  EXPECT_EQ(splats.count(), count + added);
+  EXPECT_GT(added, 10u);
+  for (size_t i = count; i < splats.count(); ++i) {
+    EXPECT_NEAR(double(splats.position[3 * i + 2]) + splats.origin[2], 0, 0.5) << "in front of or behind the wall";
+  }
+  EXPECT_LT(maq::fit_splats(splats, photos, options).first, 0.4 * before);
+  EXPECT_LT(maq::fill_holes(with_hole = truth, photos, 2), 30u);
 }
 
 TEST(SplatFit, ACancelledFitKeepsItsLastStepAndWrongPhotosAreRefused) {

@@ -10,6 +10,7 @@
 #include "scene/assembly/build_scene.h"
 #include "scene/splats/splat_discs.h"
 #include "scene/splats/splat_fit.h"
+#include "scene/splats/splat_holes.h"
 
 using namespace maq;
 
@@ -114,8 +115,10 @@ std::optional<Splats> fitted_splats(const Scene& scene, const Capture& capture, 
   };
   WorkerThreads threads(options.threads);
   Splats splats = splats_of_points(scene, threads);
-  fit_splats(splats, photos_to_fit(capture, settings.options.long_side_px, settings.options.uses_held_out), options,
-             progress);
+  const std::vector<FitPhoto> photos =
+      photos_to_fit(capture, settings.options.long_side_px, settings.options.uses_held_out);
+  fill_holes(splats, photos, options.threads);
+  fit_splats(splats, photos, options, progress);
   if (is_cancelled) return std::nullopt;
   return splats;
 }

@@ -13,7 +13,9 @@ namespace {
 // Neighbours that span the plane, and the one whose distance is the size of a gap.
 constexpr size_t kPlaneNeighbours = 8, kGapNeighbour = 6;
 // The standard deviation of a disc in gaps (measured on tests/media/room), its least and greatest thickness in that.
-constexpr double kGapDeviation = 0.5, kMinThickness = 0.1;
+constexpr double kGapDeviation = 0.45, kMinThickness = 0.1;
+// The largest gap, in the usual one among its neighbours: stray points would become blots.
+constexpr double kMaxGap = 2;
 constexpr float kDiscOpacity = 0.99f;
 
 struct Neighbours {
@@ -54,13 +56,17 @@ std::array<float, 4> quaternion_of(const std::array<Vec3, 3>& axes) {
   return {float(std::cos(angle / 2)), float(part.x), float(part.y), float(part.z)};
 }
 
-Splat disc_of(const FittedPoints& points, const std::array<double, 3>& origin, size_t i, double gap) {
+// The distance to the neighbours; 0 for a point without any.
+double gap_of(const Neighbours& near) {
+  return near.count > 0 ? std::sqrt(double(near.distance[std::min(near.count, kGapNeighbour) - 1])) : 0;
+}
+
+Splat disc_of(const FittedPoints& points, const std::array<double, 3>& origin, size_t i, const Neighbours& near,
+              double gap) {
   Splat disc;
   disc.position = {origin[0] + double(points.x[i]), origin[1] + double(points.y[i]), origin[2] + double(points.z[i])};
   for (size_t c = 0; c < 3; ++c) disc.colour[c] = points.constant_terms[i * kFeatures + c];
   disc.opacity = kDiscOpacity;
-  const Neighbours near = neighbours_of(points, i);
-  if (near.count > 0) gap = std::sqrt(double(near.distance[std::min(near.count, kGapNeighbour) - 1]));
   const double deviation = kGapDeviation * gap;
   disc.scale = {float(deviation), float(deviation), float(deviation)};
   if (near.count < 3) return disc;
@@ -87,12 +93,23 @@ Splats splats_of_points(const Scene& scene, WorkerThreads& threads) {
   threads.run(scene.block_count, [&](size_t b, int) {
     const SceneBlock& block = scene.blocks[b];
     const FittedPoints points = decode_block(scene, block);
-    // Of a point that is alone in its block.
-    double size = 0;
-    for (size_t axis = 0; axis < 3; ++axis) size = std::max(size, double(block.high[axis] - block.low[axis]));
-    discs[b].reserve(points.count());
+    std::vector<Neighbours> near;
+    std::vector<double> gaps;
     for (size_t i = 0; i < points.count(); ++i) {
-      discs[b].push_back(disc_of(points, scene.origin, i, size / std::sqrt(double(points.count()))));
+      near.push_back(neighbours_of(points, i));
+      gaps.push_back(gap_of(near.back()));
+    }
+    std::vector<double> sorted = gaps;
+    const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    // Of points that are alone, or all in one place.
+    double usual = *middle;
+    for (size_t axis = 0; axis < 3 && *middle == 0; ++axis) {
+      usual = std::max(usual, double(block.high[axis] - block.low[axis]) / double(points.count()));
+    }
+    for (size_t i = 0; i < points.count(); ++i) {
+      const double gap = gaps[i] > 0 ? std::min(gaps[i], kMaxGap * usual) : usual;
+      discs[b].push_back(disc_of(points, scene.origin, i, near[i], gap));
     }
   });
   Splats splats;

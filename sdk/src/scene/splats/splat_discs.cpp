@@ -102,7 +102,7 @@ Splats splats_of_points(const Scene& scene, WorkerThreads& threads) {
     std::vector<double> sorted = gaps;
     const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
-    // Of points that are alone, or all in one place.
+    // Points that are alone, or all in one place, have no gap.
     double usual = *middle;
     for (size_t axis = 0; axis < 3 && *middle == 0; ++axis) {
       usual = std::max(usual, double(block.high[axis] - block.low[axis]) / double(points.count()));

@@ -15,16 +15,15 @@
 namespace maq {
 namespace {
 
-// What is fitted of a splat: colours, the logit of the opacity, logarithms of the scales, a rotation in the world, a
+// The numbers that are fitted: colours, the logit of the opacity, logarithms of the scales, a rotation in the world, a
 // shift in units of the mean scale.
 constexpr size_t kFitColour = 0, kFitOpacity = 3, kFitScale = 4, kFitRotation = 7, kFitShift = 10, kFitted = 13;
-// Steps of Adam, by kind: of 3D Gaussian Splatting's programs, larger because a fit is short; chosen on
-// tests/media/room.
+// The steps of Adam, larger than in programs for 3D Gaussian Splatting, because a fit is short.
 constexpr float kSteps[kFitted] = {0.02f, 0.02f, 0.02f, 0.05f, 0.03f, 0.03f, 0.03f,
                                    0.02f, 0.02f, 0.02f, 0.03f, 0.03f, 0.03f};
-constexpr float kLastStep = 0.1f;  // what is left of a step at the end
+constexpr float kFinalStep = 0.1f;  // what is left of a step at the end
 constexpr float kMomentum = 0.9f, kSquaresMomentum = 0.99f;
-constexpr float kLeastVariance = 1e-24f;
+constexpr float kMinSquare = 1e-24f;
 constexpr float kMaxLogit = 6, kHalfLog2 = 1.44269504f / 2;
 constexpr float kMaxGrowth = 2;  // of a scale, as a logarithm
 
@@ -221,7 +220,7 @@ void SplatFit::update(FittedSplat& of, uint32_t place, const float* gradient, fl
     const float g = std::isfinite(gradient[k]) ? gradient[k] : 0;
     of.mean[k] = kMomentum * of.mean[k] + (1 - kMomentum) * g;
     of.squares[k] = kSquaresMomentum * of.squares[k] + (1 - kSquaresMomentum) * g * g;
-    change[k] = -size * kSteps[k] * unbias * of.mean[k] / std::sqrt(unbias_squares * of.squares[k] + kLeastVariance);
+    change[k] = -size * kSteps[k] * unbias * of.mean[k] / std::sqrt(unbias_squares * of.squares[k] + kMinSquare);
   }
   Splat& splat = of.splat;
   for (size_t k = 0; k < 3; ++k) {
@@ -304,7 +303,7 @@ SplatFitErrors fit_splats(Splats& splats, const std::vector<FitPhoto>& photos, c
       for (size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random() % i]);
     }
     const size_t index = order[turn];
-    last[index] = fit.step(photos[index], std::pow(kLastStep, float(done)));
+    last[index] = fit.step(photos[index], std::pow(kFinalStep, float(done)));
     if (first[index] < 0) first[index] = last[index];
     ++errors.steps;
     if (progress && !progress(done, "Fitting splats to the photos.")) break;

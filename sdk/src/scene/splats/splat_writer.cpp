@@ -12,15 +12,15 @@
 namespace maq {
 namespace {
 
-// What a logit and a logarithm can hold.
-constexpr float kLeastOpacity = 1e-6f, kLeastScale = 1e-12f;
+// A logit and a logarithm hold nothing smaller.
+constexpr float kMinFileOpacity = 1e-6f, kMinFileScale = 1e-12f;
 
 float logit(float opacity) {
-  const float within = std::clamp(opacity, kLeastOpacity, 1 - kLeastOpacity);
+  const float within = std::clamp(opacity, kMinFileOpacity, 1 - kMinFileOpacity);
   return std::log(within / (1 - within));
 }
 
-float log_scale(float scale) { return std::log(std::max(scale, kLeastScale)); }
+float log_scale(float scale) { return std::log(std::max(scale, kMinFileScale)); }
 
 float coefficient_of(float colour) { return (colour - 0.5f) / kShConstant; }
 

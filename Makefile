@@ -70,6 +70,10 @@ test-hostile: packages-test build  ## some 4,000 hostile inputs to the built pro
 test-glb: build  ## heads and bodies as .glb by the Khronos validator and in three.js; needs node and npm; not part of `test-all`
 	@scripts/test-glb.sh
 
+.PHONY: test-splats
+test-splats: build  ## splats as .ply, .spz and .glb by splat-transform and the Khronos validator; needs node and npm; not part of `test-all`
+	@scripts/test-splats.sh
+
 FUZZ_SECONDS ?= 600
 .PHONY: fuzz
 fuzz: packages-fuzz  ## each fuzz target for FUZZ_SECONDS (libFuzzer, sanitizers), one on each core; a few seconds of each are in `test-all`

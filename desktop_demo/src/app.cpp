@@ -180,7 +180,9 @@ void App::show_head(bool adds_photo) {
 
 void App::open(const std::string& path_or_uri) {
   std::error_code error;
-  const bool is_scene = fs::is_directory(path_or_uri, error) || fs::path(path_or_uri).extension() == ".maqs";
+  const fs::path extension = fs::path(path_or_uri).extension();
+  const bool is_scene =
+      fs::is_directory(path_or_uri, error) || extension == ".maqs" || extension == ".ply" || extension == ".spz";
   if (!is_scene) {
     live_->open(path_or_uri);
     return show(*live_);

@@ -36,7 +36,7 @@ void Panel::draw_help(bool* is_open) const {
   ImGui::SetNextWindowPos({float(all.width) / 2, float(all.height) / 2}, 0, {0.5f, 0.5f});
   ImGui::Begin("Help", is_open, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoCollapse);
   ImGui::TextUnformatted(
-      "Drop a photo, a clip, a recording, a scene (.maqs) or a folder with a capture here.\n"
+      "Drop a photo, a clip, a recording, a scene (.maqs, .ply, .spz) or a folder with a capture here.\n"
       "In the try-on view a dropped picture is worn.\n\n");
   constexpr const char* kKeys[][2] = {
       {"1 to 6", "camera, parts, U/V contours, mask, boxes, try-on"},

@@ -133,7 +133,9 @@ class Scene(NativeObject):
 
     @staticmethod
     def open(file: str | os.PathLike[str] | bytes) -> Scene:
-        """Reads a file that `save` wrote, by its path or its bytes. Raises MaquetteError."""
+        """Reads a file that `save` wrote, by its path or its bytes. Also reads splats (.ply, .spz), by their path.
+
+        Raises MaquetteError."""
         n = native()
         if isinstance(file, bytes):
             data = n.ffi.from_buffer(file)
@@ -141,7 +143,9 @@ class Scene(NativeObject):
         return Scene(n.create("maq_scene", n.context, os.fsencode(file), function="maq_scene_open"))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a scene file (.maqs), atomically. Raises MaquetteError."""
+        """Writes a scene file (.maqs), or splats for other programs (.ply, .spz, .glb), atomically.
+
+        Raises MaquetteError."""
         native().call("maq_scene_save", self.handle, path_to_write(path))
 
     def save_ply(self, path: str | os.PathLike[str]) -> None:

@@ -224,6 +224,8 @@ class SceneBuildSettings(ModelSettings, total=False):
     use_held_out: int
     """1: also use photos that the capture holds out for comparison; 0: do not."""
 
+    splat_fit_s: float
+
 
 class DenseCloudSettings(TypedDict, total=False):
     """Fields of maq_dense_cloud_config."""
@@ -239,11 +241,12 @@ class SceneRendererSettings(ModelSettings, total=False):
     """Fields of maq_scene_renderer_config."""
 
     near_depth: float
-    """Points nearer to the camera along its axis are not drawn; units of the scene."""
+    """Points nearer to the camera along its axis are not drawn; units of the scene. Splats also not if they reach
+    behind the camera: if their standard deviation is above their depth."""
 
     use_background: int
     """1: images are composed over `background` by their alpha. 0: pixels without points have the mean colour of the
-    photos where they show no point."""
+    photos where they show no point; splats are composed over black."""
 
     background: Sequence[int]
     """Red, green, blue; with use_background."""

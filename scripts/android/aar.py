@@ -36,7 +36,7 @@ PAGE_BYTES = 16384
 # operators; that of x86_64, for emulators, is 11.9 MB.
 MAX_ABI_BYTES = {"arm64-v8a": 12_000_000, "x86_64": 14_000_000}
 # Libraries of Android that every app may use (NDK: "stable APIs").
-ANDROID_LIBRARIES = {"libc.so", "libm.so", "libdl.so", "liblog.so", "libandroid.so", "libjnigraphics.so"}
+ANDROID_LIBRARIES = {"libc.so", "libm.so", "libdl.so", "liblog.so", "libandroid.so", "libjnigraphics.so", "libz.so"}
 OURS = {"libmaquette.so": r"maq_\w+", "libmaquette_jni.so": r"(Java_dev_maquette_jni_\w+|JNI_OnLoad)"}
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 TARGETS = {"arm64-v8a": "aarch64-linux-android26", "x86_64": "x86_64-linux-android26"}
 # Other names are of the C library. (libm and libdl are apart on Android; which of the three has a name is not checked.)
-PREFIXES = {"liblog": "__android_log_", "libandroid": "A"}
+PREFIXES = {"liblog": "__android_log_", "libandroid": "A", "libz": ("inflate", "deflate")}
 
 
 def symbols(library: Path) -> tuple[set[str], set[str]]:

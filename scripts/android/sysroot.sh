@@ -57,7 +57,7 @@ cp -r "$work/debian/usr/include/android/android" "$sysroot/include/android/"
 cp "$work/debian/usr/include/android/nativehelper/jni.h" "$sysroot/include/android/"
 # Libraries of headers alone.
 mkdir -p "$sysroot/usr/include" "$sysroot/usr/share/cmake"
-cp -r /usr/include/nlohmann /usr/include/xxhash.h "$sysroot/usr/include/"
+cp -r /usr/include/nlohmann /usr/include/{xxhash,zlib,zconf}.h "$sysroot/usr/include/"
 cp -r /usr/share/cmake/nlohmann_json "$sysroot/usr/share/cmake/"
 
 for abi in arm64-v8a x86_64; do

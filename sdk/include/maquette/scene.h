@@ -10,8 +10,10 @@
  *
  * An app with its own point cloud and cameras adds its photos to a maq_scene_builder.
  *
- * Lengths are in the unit of the cloud and the cameras ("units of the scene"). A scene is rendered with the bundle that
- * built it. Objects may be destroyed in any order. */
+ * maq_scene_open also reads 3D Gaussians ("splats") of other programs, and the renderer draws them on the CPU.
+ *
+ * Lengths are in the unit of the cloud and the cameras ("units of the scene"). A scene of points is rendered with the
+ * bundle that built it; splats need none. Objects may be destroyed in any order. */
 #ifndef MAQUETTE_SCENE_H_
 #define MAQUETTE_SCENE_H_
 
@@ -68,6 +70,9 @@ typedef struct maq_scene_build_config {
   uint32_t max_views;      /* if there are more photos, an even selection is used. 0: no limit */
   int32_t use_held_out;    /* 1: also use photos that the capture holds out for comparison; 0: do not */
   maq_scene_points points; /* with MAQ_SCENE_POINTS_DEPTH, max_points 0 means 1.5 million */
+  /* Above 0: the scene is of splats, one for each point, which are fitted to the photos for so many seconds of
+   * wall-clock time. Save it to a .ply, .spz or .glb file. 0: points. At most 86400 */
+  double splat_fit_s;
 } maq_scene_build_config;
 
 typedef struct maq_scene_build_stats {
@@ -156,23 +161,26 @@ MAQ_API maq_status maq_scene_builder_finish(maq_scene_builder* builder, maq_scen
 
 typedef struct maq_scene_info {
   uint32_t struct_size;
-  int32_t coefficient_bits; /* 8, 16 or 32 */
-  uint64_t point_count;
+  int32_t coefficient_bits;            /* 8, 16 or 32 */
+  uint64_t point_count;                /* or splats */
   uint64_t view_dependent_count;       /* points with descriptors that depend on the viewing direction */
-  uint64_t block_count;                /* boxes of neighbouring points, the units of frustum culling */
-  double up[3];                        /* of the world; unit vector */
+  uint64_t block_count;                /* boxes of neighbouring points, the units of frustum culling; splats: 0 */
+  double up[3];                        /* of the world; unit vector. Splats: (0, -1, 0), because files do not have it */
   double bounds_min[3], bounds_max[3]; /* of the points, in the world */
-  uint8_t networks_sha256[32];         /* of the networks that built it; a renderer needs the same networks */
+  uint8_t networks_sha256[32];         /* of the networks that built it, which a renderer needs; splats: zeros */
 } maq_scene_info;
 
 /* Opens a scene file (.maqs): checks all of it and maps it into memory. While the scene is open the file must not be
- * written to or truncated. It may be deleted or renamed, and maq_scene_save may replace it. The caller owns `*scene`;
- * give it to maq_scene_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (truncated, damaged, or not
- * a scene), MAQ_ERROR_UNSUPPORTED (another version), MAQ_ERROR_OUT_OF_MEMORY. Blocks while the file is checked. */
+ * written to or truncated. It may be deleted or renamed, and maq_scene_save may replace it.
+ * Also reads splats, into memory: .ply files of 3D Gaussian Splatting, and .spz files of versions 2 and 3. The file's
+ * first bytes tell its kind. Splats with numbers that are not finite are left out.
+ * The caller owns `*scene`; give it to maq_scene_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_UNREADABLE (truncated, damaged, not
+ * a scene, or without splats), MAQ_ERROR_UNSUPPORTED (another version, a .ply file of points, over 30 million splats),
+ * MAQ_ERROR_OUT_OF_MEMORY. Blocks while the file is checked. */
 MAQ_API maq_status maq_scene_open(maq_context* context, const char* path, maq_scene** scene);
 
-/* Opens a scene file in memory, of any alignment; it is copied. Otherwise like maq_scene_open. */
+/* Opens a scene file (.maqs) in memory, of any alignment; it is copied. Otherwise like maq_scene_open. */
 MAQ_API maq_status maq_scene_open_memory(maq_context* context, const void* data, size_t size_bytes, maq_scene** scene);
 
 /* Frees the scene (NULL is fine). Its renderers stay usable.
@@ -180,11 +188,16 @@ MAQ_API maq_status maq_scene_open_memory(maq_context* context, const void* data,
 MAQ_API void maq_scene_destroy(maq_scene* scene);
 
 /* Writes the scene to a file, atomically: an existing file stays until the new one is complete. The folder must exist.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks until the file is on the disk. */
+ * The extension tells the kind of file. A .ply, .spz or .glb file has splats for other programs: 3D Gaussian Splatting,
+ * SPZ version 3, glTF with KHR_gaussian_splatting. Points become flat splats without view dependence. Every other
+ * extension is a scene file (.maqs).
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_UNSUPPORTED (splats to a scene file,
+ * coordinates over 8 million to an .spz file), MAQ_ERROR_OUT_OF_MEMORY. Blocks until the file is on the disk. */
 MAQ_API maq_status maq_scene_save(const maq_scene* scene, const char* path);
 
 /* Writes positions and mean colours as a binary PLY file, for other programs; atomically.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE. Blocks until the file is on the disk. */
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_UNWRITABLE, MAQ_ERROR_UNSUPPORTED (splats). Blocks until
+ * the file is on the disk. */
 MAQ_API maq_status maq_scene_save_ply(const maq_scene* scene, const char* path);
 
 /* Describes the scene. The caller sets info->struct_size.
@@ -201,10 +214,12 @@ MAQ_API maq_status maq_scene_get_build_stats(const maq_scene* scene, maq_scene_b
 /* All zero is the default. */
 typedef struct maq_scene_renderer_config {
   uint32_t struct_size;
-  maq_model_options model; /* the network: the bundle that built the scene. MAQ_THREADS_MEASURED is not supported. */
-  double near_depth;       /* points nearer to the camera along its axis are not drawn; units of the scene */
+  maq_model_options model; /* the network: the bundle that built the scene. MAQ_THREADS_MEASURED is not supported. For
+                              splats the bundle is not read. */
+  double near_depth;       /* points nearer to the camera along its axis are not drawn; units of the scene. Splats also
+                              not if they reach behind the camera: if their standard deviation is above their depth. */
   int32_t use_background;  /* 1: images are composed over `background` by their alpha. 0: pixels without points have the
-                              mean colour of the photos where they show no point. */
+                              mean colour of the photos where they show no point; splats are composed over black. */
   uint8_t background[3];   /* red, green, blue; with use_background */
   uint32_t image_pool_size; /* images the app may hold at once, 1 to 64. 0: 4 */
 } maq_scene_renderer_config;
@@ -212,14 +227,14 @@ typedef struct maq_scene_renderer_config {
 /* Times in wall-clock milliseconds, and counts, of one image. */
 typedef struct maq_scene_render_stats {
   uint32_t struct_size;
-  float project_ms;  /* points to pixels */
-  float shade_ms;    /* descriptors of the visible points, and coarser rasters */
+  float project_ms;  /* points to pixels; splats: also sorting */
+  float shade_ms;    /* descriptors of the visible points, and coarser rasters; blending of splats */
   float refine_ms;   /* the network */
   float resample_ms; /* back to the camera's roll, colours to bytes */
   float total_ms;
   uint32_t drawn_block_count;  /* blocks within the view frustum */
   uint64_t drawn_point_count;  /* points of these blocks */
-  uint64_t shaded_point_count; /* points that are front-most at some pixel */
+  uint64_t shaded_point_count; /* points that are front-most at some pixel; splats within the image */
   int64_t refined_pixel_count; /* pixels that the network computed */
   maq_provider provider;       /* in use for the network; MAQ_PROVIDER_CPU if it did not run */
 } maq_scene_render_stats;
@@ -229,9 +244,10 @@ typedef struct maq_scene_render_stats {
 MAQ_API maq_status maq_scene_renderer_config_init(maq_scene_renderer_config* config, uint32_t struct_size);
 
 /* Creates a renderer of a scene. Several renderers of one scene may run at once. They share its points, not the
- * networks. `config` may be NULL for the defaults. The caller owns `*renderer`; give it to maq_scene_renderer_destroy.
- * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE (also: other networks built
- * the scene), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while networks are read. */
+ * networks; a renderer of splats has a copy of these. `config` may be NULL for the defaults. The caller owns
+ * `*renderer`; give it to maq_scene_renderer_destroy.
+ * Any thread. Errors: MAQ_ERROR_INVALID_ARGUMENT, MAQ_ERROR_NOT_FOUND, MAQ_ERROR_BAD_BUNDLE (also: other networks
+ * built the scene), MAQ_ERROR_RUNTIME_LIBRARY. Blocks while networks are read. */
 MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_renderer_config* config,
                                              const maq_scene* scene, maq_scene_renderer** renderer);
 
@@ -240,8 +256,9 @@ MAQ_API maq_status maq_scene_renderer_create(maq_context* context, const maq_sce
 MAQ_API void maq_scene_renderer_destroy(maq_scene_renderer* renderer);
 
 /* Renders the view of a camera, in the camera's size. The first image of a size takes longer, because networks are
- * prepared for it. If no point is visible, no network runs. `*image` comes from a pool of image_pool_size: give it back
- * with maq_image_release. It has the planes BGR, ALPHA and DEPTH.
+ * prepared for it. If no point is visible, no network runs. Splats are sorted by depth and blended from front to back.
+ * Their alpha is opacity; their depth is the mean of the splats that a pixel shows. `*image` comes from a pool of
+ * image_pool_size: give it back with maq_image_release. It has the planes BGR, ALPHA and DEPTH.
  * One at a time. Errors: MAQ_ERROR_INVALID_ARGUMENT (an invalid camera, one with distortion, a principal point over a
  * million pixels away, focal lengths that differ by a factor over 1000). MAQ_ERROR_IMAGE_SIZE. MAQ_ERROR_POOL_EMPTY.
  * MAQ_ERROR_OUT_OF_MEMORY. MAQ_ERROR_INFERENCE. Blocks while it renders. */

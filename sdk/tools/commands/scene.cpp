@@ -43,15 +43,41 @@ int show(const InfoOptions& options) {
   const maq_scene_info info = scene.info();
   const uint64_t bytes = std::filesystem::file_size(options.scene);
   print_output("%s: %.1f MB\n", options.scene.c_str(), double(bytes) / 1e6);
-  print_output("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count,
-               double(bytes) / double(info.point_count), info.block_count);
-  print_output("  of these   %" PRIu64 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
-               info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
-               info.coefficient_bits);
+  const double each = double(bytes) / double(info.point_count);
+  if (info.block_count == 0) {
+    print_output("  splats     %" PRIu64 ", %.1f bytes each; their colours are %s\n", info.point_count, each,
+                 info.view_dependent_count > 0 ? "view-dependent" : "constant");
+  } else {
+    print_output("  points     %" PRIu64 ", %.1f bytes each; %" PRIu64 " blocks\n", info.point_count, each,
+                 info.block_count);
+    print_output("  of these   %" PRIu64
+                 " (%.0f %%) depend on the view, the rest are constant; %d bits a coefficient\n",
+                 info.view_dependent_count, 100.0 * double(info.view_dependent_count) / double(info.point_count),
+                 info.coefficient_bits);
+  }
   print_output("  box        %g %g %g to %g %g %g\n", info.bounds_min[0], info.bounds_min[1], info.bounds_min[2],
                info.bounds_max[0], info.bounds_max[1], info.bounds_max[2]);
   print_output("  up         %g %g %g\n", info.up[0], info.up[1], info.up[2]);
   write_json_file(options.json, describe_scene(info, bytes), 2);
+  return 0;
+}
+
+struct ExportOptions {
+  std::string scene;
+  std::string out;
+};
+
+int export_splats(const ExportOptions& options) {
+  const std::string kind = std::filesystem::u8path(options.out).extension().string();
+  if (kind != ".ply" && kind != ".spz" && kind != ".glb") {
+    throw std::runtime_error("--out is " + options.out + ", but must end with .ply, .spz or .glb.");
+  }
+  make_folder_of(options.out);
+  require_writable(options.out);
+  const maquette::Context context = open_context();
+  const maquette::Scene scene(context, options.scene);
+  scene.save(options.out);
+  print_output("%s: %" PRIu64 " splats\n", options.out.c_str(), scene.info().point_count);
   return 0;
 }
 
@@ -91,7 +117,18 @@ void add_scene_command(CLI::App& app, int* exit_code) {
   add_scene_render_command(*scene, exit_code);
   auto options = std::make_shared<InfoOptions>();
   CLI::App* command = scene->add_subcommand("info", "Check a scene file and print its content");
-  command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
+  command->add_option("scene", options->scene, "A file made by `maquette scene build`, or splats (.ply, .spz)")
+      ->required();
   command->add_option("--json", options->json, "Also write this information to this file");
   command->callback([=] { *exit_code = show(*options); });
+  auto exporting = std::make_shared<ExportOptions>();
+  CLI::App* to_splats = scene->add_subcommand("export", "Write a scene as 3D Gaussians (splats) for other programs");
+  to_splats->add_option("scene", exporting->scene, "A file made by `maquette scene build`, or splats (.ply, .spz)")
+      ->required();
+  to_splats
+      ->add_option("-o,--out", exporting->out,
+                   "File of the splats: .ply (3D Gaussian Splatting), .spz (version 3), or .glb "
+                   "(KHR_gaussian_splatting)")
+      ->required();
+  to_splats->callback([=] { *exit_code = export_splats(*exporting); });
 }

@@ -34,6 +34,7 @@ struct BuildOptions {
   uint64_t points = 0;
   uint32_t views = 0;
   bool all_photos = false;
+  double splat_fit_s = 60;
   maq_scene_points points_from = MAQ_SCENE_POINTS_DEFAULT;
 };
 
@@ -85,6 +86,12 @@ int build(const BuildOptions& options) {
   config.max_views = options.views;
   config.use_held_out = options.all_photos ? 1 : 0;
   config.points = options.points_from;
+  const std::string kind = std::filesystem::u8path(options.out).extension().string();
+  const bool makes_splats = kind == ".ply" || kind == ".spz" || kind == ".glb";
+  config.splat_fit_s = makes_splats ? options.splat_fit_s : 0;
+  if (makes_splats && !options.ply.empty()) {
+    throw std::runtime_error("--ply is for scenes of points; " + options.out + " has splats.");
+  }
   config.progress_callback = show_progress;
   config.progress_user_data = &progress;
   const maquette::Scene scene = build_or_tell(context, config, capture, options.out);
@@ -139,7 +146,14 @@ void add_scene_build_command(CLI::App& scene, int* exit_code) {
       ->add_option("capture", options->capture,
                    "Folder with photos, a point cloud, and a COLMAP model or transforms.json")
       ->required();
-  command->add_option("-o,--out", options->out, "File of the scene: room.maqs; replaces an existing one")->required();
+  command
+      ->add_option("-o,--out", options->out,
+                   "File of the scene: room.maqs; or of splats: room.spz, room.ply, room.glb. Replaces an existing one")
+      ->required();
+  command
+      ->add_option("--fit-seconds", options->splat_fit_s,
+                   "Splats only: fit them to the photos for so many seconds (default 60)")
+      ->check(CLI::Range(0.001, 86400.0));
   command->add_option(
       "--bundle", options->bundle,
       "Folder of the scene bundle; default: MAQ_SCENE_BUNDLE, then the one installed with this program");

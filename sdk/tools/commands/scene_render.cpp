@@ -231,7 +231,8 @@ int render(const RenderOptions& options) {
 void add_scene_render_command(CLI::App& scene, int* exit_code) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = scene.add_subcommand("render", "Render a scene: images from given cameras, or a clip");
-  command->add_option("scene", options->scene, "A file made by `maquette scene build`")->required();
+  command->add_option("scene", options->scene, "A file made by `maquette scene build`, or splats (.ply, .spz)")
+      ->required();
   command->add_option("-o,--out", options->out, "File of the clip, such as clip.mp4, or folder for the images")
       ->required();
   command

@@ -96,6 +96,27 @@ TEST_F(SceneCommandLine, BuildsASceneWithTheFiguresThatTheBenchmarkReads) {
   }
 }
 
+TEST_F(SceneCommandLine, SplatsAreExportedBuiltAndRendered) {
+  ASSERT_EQ(run("build place --out o/place.maqs").exit_code, 0);
+  const Outcome exported = run("export o/place.maqs --out o/place.ply");
+  ASSERT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_NE(exported.out.find(" splats"), std::string::npos) << exported.out;
+  const Outcome built = run("build place --out o/fitted.spz --fit-seconds 0.3 --json o/build.json");
+  ASSERT_EQ(built.exit_code, 0) << built.err;
+  ASSERT_EQ(run("export o/fitted.spz --out o/fitted.glb").exit_code, 0);
+  for (const char* name : {"place.ply", "fitted.spz"}) {
+    const Outcome info = run(std::string("info o/") + name);
+    EXPECT_NE(info.out.find("splats"), std::string::npos) << info.out;
+    const Outcome rendered =
+        run(std::string("render o/") + name + " --capture place --views held-out --out o/" + name + ".images");
+    EXPECT_EQ(rendered.exit_code, 0) << rendered.err;
+  }
+  const Outcome unknown = run("export o/place.maqs --out o/place.splat");
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_NE(unknown.err.find(".spz"), std::string::npos) << unknown.err;
+  EXPECT_EQ(run("build place --out o/more.spz --ply o/points.ply").exit_code, 1);
+}
+
 TEST_F(SceneCommandLine, ASceneThatIsBuiltIntoADeviceIsNoFailure) {
   const Outcome result = run("build place --out /dev/null");
   EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -10,7 +10,11 @@
 #include "scene/format/scene_file.h"
 #include "scene/format/scene_file_format.h"
 #include "scene/format/scene_packing.h"
+#include "scene/splats/gzip_file.h"
+#include "scene/splats/splat_files.h"
+#include "scene/splats/splat_renderer.h"
 #include "support/samples/fitted_scene.h"
+#include "support/samples/made_splats.h"
 #include "support/temp_folder.h"
 
 using namespace maq;
@@ -47,6 +51,24 @@ fuzz::Bytes repaired_scene(fuzz::Bytes bytes) {
   head.head_check = XXH3_64bits(&head.file_bytes, sizeof head - kChecked);
   std::memcpy(bytes.data(), &head, sizeof head);
   return bytes;
+}
+
+// A byte for compressed or not, and the file.
+std::vector<fuzz::Bytes> splat_seeds() {
+  std::vector<fuzz::Bytes> seeds;
+  for (int degree = 0; degree <= 3; ++degree) {
+    const MadeSplats made = made_splats(6, degree);
+    for (const char* form : {"ascii", "binary_little_endian"}) {
+      seeds.push_back(fuzz::bytes_of(std::string(1, '\0') + made.ply(form)));
+    }
+    for (const uint32_t version : {2u, 3u}) {
+      fuzz::Bytes seed = {1};
+      const std::vector<uint8_t> file = made.spz(version);
+      seed.insert(seed.end(), file.begin(), file.end());
+      seeds.push_back(seed);
+    }
+  }
+  return seeds;
 }
 
 // A byte for text or binary, the lengths of two files, and the three files.
@@ -115,6 +137,25 @@ FUZZ(ply) {
   fuzz::run_or_refuse({MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED}, [&] {
     ImportReport report;
     read_ply_file(file.path(), kOrigin, report);
+  });
+}
+
+SEEDED_FUZZ(splats, splat_seeds) {
+  if (bytes.empty()) return;
+  // As it is, or compressed: an SPZ file that is changed after compression is rarely read far.
+  const fuzz::Bytes rest(bytes.begin() + 1, bytes.end());
+  const fuzz::MemoryFile file(bytes[0] % 2 == 0 ? rest : gzip_of(rest));
+  fuzz::run_or_refuse({MAQ_ERROR_UNREADABLE, MAQ_ERROR_UNSUPPORTED}, [&] {
+    const Splats splats = read_splat_file(file.path());
+    fuzz::require(splats.count() > 0, "no splats");
+    PinholeCamera camera;
+    camera.width_px = camera.height_px = 40;
+    camera.fx_px = camera.fy_px = 30;
+    camera.centre = {0, 0, -2};
+    SplatRenderer renderer(splats, {});
+    RenderedImage image;
+    renderer.render(camera, image);
+    for (const float depth : image.depth) fuzz::require(std::isfinite(depth), "a depth that is not finite");
   });
 }
 

@@ -52,7 +52,7 @@ OUT_OF_RANGE = {
     "maq_scene_build": {
         "long_side_px": (-2, 16385), "coefficient_bits": (9,), "min_variation": (-0.5, NAN),
         "visibility_scale visibility scale": (1.01, NAN), "near_depth nearest point": (-1, NAN), "use_held_out": (2,),
-        "points": (3,)},
+        "points": (3,), "splat_fit_s": (-1, 1e5, NAN)},
     "maq_dense_cloud_create": {"threads": (65, -1)},
     "maq_scene_renderer_create": {"image_pool_size": (65,), "near_depth": (-1, NAN), "use_background": (2,)},
     "maq_pipeline_create": {"result_pool_size": (65,), "nice": (20,)},

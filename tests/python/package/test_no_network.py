@@ -45,6 +45,7 @@ COMMANDS = {
     "scene build": [f"{MEDIA}/room", "--points", "2000", "--views", "2", "--long-side", "160", "--out", "{}/room.maqs"],
     "scene render": ["{}/room.maqs", "--path", "orbit", "--size", "80x60", "--seconds", "0.1", "--out", "{}/room.mp4"],
     "scene info": ["{}/room.maqs"],
+    "scene export": ["{}/room.maqs", "--out", "{}/room.spz"],
     "bench": [PEOPLE, "--warm-up", "1", "--runs", "2", "--seconds", "0.01"],
 }  # fmt: skip
 GROUPS = {"scene"}  # commands that only hold others

@@ -8,6 +8,9 @@
 #include "api/frame_handle.h"
 #include "api/scene/scene_conversions.h"
 #include "scene/assembly/build_scene.h"
+#include "scene/splats/splat_discs.h"
+#include "scene/splats/splat_fit.h"
+#include "scene/splats/splat_holes.h"
 
 using namespace maq;
 
@@ -71,6 +74,7 @@ BuildSettings checked_settings(const maq_scene_build_config& config) {
   const int32_t points = number_in(config.points);
   require_range("config.points", points, int32_t(MAQ_SCENE_POINTS_DEFAULT), int32_t(MAQ_SCENE_POINTS_DEPTH));
   options.points = PointSource(points);
+  require_range("config.splat_fit_s", config.splat_fit_s, 0.0, 86400.0);
   settings.progress = progress_of(config.progress_callback, config.progress_user_data);
   return settings;
 }
@@ -90,6 +94,33 @@ maq_scene_build_stats stats_of(const SceneBuildStats& from) {
   stats.pack_ms = from.pack_ms;
   stats.depth_ms = from.depth_ms;
   return stats;
+}
+
+// Nothing without a callback. `end`: the part of the whole work at the end of this one.
+BuildProgress part_of(const BuildProgress& whole, double end) {
+  if (!whole) return {};
+  return [=](double done, const std::string& stage) { return whole(end * done, stage); };
+}
+
+// Nothing if the callback cancelled.
+std::optional<Splats> fitted_splats(const Scene& scene, const Capture& capture, const BuildSettings& settings,
+                                    double seconds) {
+  SplatFitOptions options;
+  options.seconds = seconds;
+  options.threads = settings.session.threads;
+  bool is_cancelled = false;
+  const auto progress = [&](double done, const std::string& stage) {
+    is_cancelled = settings.progress && !settings.progress(0.2 + 0.8 * done, stage);
+    return !is_cancelled;
+  };
+  WorkerThreads threads(options.threads);
+  Splats splats = splats_of_points(scene, threads);
+  const std::vector<FitPhoto> photos =
+      photos_to_fit(capture, settings.options.long_side_px, settings.options.uses_held_out);
+  fill_holes(splats, photos, options.threads);
+  fit_splats(splats, photos, options, progress);
+  if (is_cancelled) return std::nullopt;
+  return splats;
 }
 
 // Unchanged if it has no length; the builder refuses it then.
@@ -126,9 +157,17 @@ maq_status maq_scene_build(maq_context* context, const maq_scene_build_config* g
     const BuildSettings settings = checked_settings(config);
     const auto networks = open_scene_networks(context, read_bundle_argument(config.model, "config.model", kSceneBundle),
                                               settings.session);
-    std::optional<BuiltScene> built = build_scene(capture->capture, networks, settings.options, settings.progress);
+    const double fit_s = config.splat_fit_s;
+    std::optional<BuiltScene> built =
+        build_scene(capture->capture, networks, settings.options, part_of(settings.progress, fit_s > 0 ? 0.2 : 1.0));
     if (!built) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback cancelled the build.");
-    *scene = new maq_scene(std::move(built->scene), stats_of(built->stats));
+    if (fit_s > 0) {
+      std::optional<Splats> splats = fitted_splats(built->scene, capture->capture, settings, fit_s);
+      if (!splats) return keep_error(context, MAQ_CANCELLED, nullptr, "The progress callback cancelled the fit.");
+      *scene = new maq_scene(std::move(*splats), stats_of(built->stats));
+    } else {
+      *scene = new maq_scene(std::move(built->scene), stats_of(built->stats));
+    }
     return MAQ_OK;
   });
 }

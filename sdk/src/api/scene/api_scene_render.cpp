@@ -1,10 +1,12 @@
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "api/boundary.h"
 #include "api/image/image_handle.h"
 #include "api/scene/scene_conversions.h"
 #include "scene/render/scene_renderer.h"
+#include "scene/splats/splat_renderer.h"
 
 using namespace maq;
 
@@ -32,13 +34,26 @@ maq_scene_render_stats stats_of(const RenderCounts& from) {
   return stats;
 }
 
+maq_scene_render_stats stats_of(const SplatRenderCounts& from) {
+  maq_scene_render_stats stats{};
+  stats.struct_size = sizeof stats;
+  stats.project_ms = float(from.project_ms + from.sort_ms);
+  stats.shade_ms = float(from.blend_ms);
+  stats.total_ms = float(from.all_ms);
+  stats.drawn_block_count = from.drawn_chunks;
+  stats.drawn_point_count = from.drawn_splats;
+  stats.shaded_point_count = from.visible_splats;
+  stats.provider = MAQ_PROVIDER_CPU;
+  return stats;
+}
+
 }  // namespace
 
 struct maq_scene_renderer : HandleOf<HandleKind::kSceneRenderer> {
-  maq_scene_renderer(const Scene& scene, std::shared_ptr<SceneNetworks> networks, const RenderOptions& options,
-                     size_t pool_size)
-      : renderer(scene, std::move(networks), options), images(pool_size, "images") {}
-  SceneRenderer renderer;
+  explicit maq_scene_renderer(size_t pool_size) : images(pool_size, "images") {}
+  // One of both.
+  std::optional<SceneRenderer> points;
+  std::optional<SplatRenderer> splats;
   BoundedPool<maq_image> images;
 };
 
@@ -57,6 +72,19 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
     require_range("config.near_depth", config.near_depth, 0.0, std::numeric_limits<double>::max());
     require_range("config.use_background", config.use_background, 0, 1);
     const SessionSettings settings = scene_session_settings(config.model);
+    auto made =
+        std::make_unique<maq_scene_renderer>(config.image_pool_size != 0 ? config.image_pool_size : kDefaultImagePool);
+    if (scene->splats) {
+      SplatRenderOptions options;
+      options.threads = settings.threads;
+      options.near = config.near_depth;
+      if (config.use_background == 1) {
+        options.background = {config.background[2], config.background[1], config.background[0]};
+      }
+      made->splats.emplace(*scene->splats, options);
+      *renderer = made.release();
+      return MAQ_OK;
+    }
     RenderOptions options;
     options.threads = settings.threads;
     options.near = config.near_depth;
@@ -70,8 +98,8 @@ maq_status maq_scene_renderer_create(maq_context* context, const maq_scene_rende
       throw Error(MAQ_ERROR_BAD_BUNDLE, "Other networks than those of bundle ", where,
                   " built the scene; give the bundle that built it, or build the scene again.");
     }
-    *renderer = new maq_scene_renderer(scene->scene, std::move(networks), options,
-                                       config.image_pool_size != 0 ? config.image_pool_size : kDefaultImagePool);
+    made->points.emplace(scene->scene, std::move(networks), options);
+    *renderer = made.release();
     return MAQ_OK;
   });
 }
@@ -84,7 +112,8 @@ maq_status maq_scene_renderer_run(maq_scene_renderer* renderer, const maq_pinhol
     require_argument(image, "image");
     const PinholeCamera from = undistorted_pinhole_of(*camera);
     BoundedPool<maq_image>::Pooled handle = renderer->images.acquire();
-    handle->scene_stats = stats_of(renderer->renderer.render(from, handle->image));
+    handle->scene_stats = renderer->splats ? stats_of(renderer->splats->render(from, handle->image))
+                                           : stats_of(renderer->points->render(from, handle->image));
     *image = lend<maq_image>(std::move(handle));
     return MAQ_OK;
   });

@@ -1,5 +1,6 @@
 #include "scene/capture/ply_header.h"
 
+#include <algorithm>
 #include <cmath>
 #include <locale>
 #include <optional>
@@ -26,19 +27,19 @@ PlyType type_of(const std::string& name, const FileReader& file) {
   for (size_t i = 0; i < std::size(kTypes); ++i) {
     if (name == kTypes[i].name || name == kTypes[i].sized_name) return PlyType(i);
   }
-  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is not a type of PLY files.");
+  file.fail(", line ", file.line(), ": \"", printable(name), "\" is not a type of PLY files.");
 }
 
 PlyForm form_of(const std::string& name, const std::string& version, const FileReader& file) {
   if (version.empty()) file.fail(", line ", file.line(), ": a format needs a name and a version.");
   if (version != "1.0") {
-    throw Error(MAQ_ERROR_UNSUPPORTED, file.path(), " is a PLY file of version ", version.substr(0, 20),
+    throw Error(MAQ_ERROR_UNSUPPORTED, file.path(), " is a PLY file of version ", printable(version),
                 ", but 1.0 is the one that is read.");
   }
   if (name == "ascii") return PlyForm::kAscii;
   if (name == "binary_little_endian") return PlyForm::kLittleEndian;
   if (name == "binary_big_endian") return PlyForm::kBigEndian;
-  file.fail(", line ", file.line(), ": \"", name.substr(0, 40), "\" is not a format of PLY files.");
+  file.fail(", line ", file.line(), ": \"", printable(name), "\" is not a format of PLY files.");
 }
 
 PlyElement element_of(std::istream& words, const FileReader& file) {
@@ -75,6 +76,13 @@ PlyProperty property_of(std::istream& words, const FileReader& file) {
 }
 
 }  // namespace
+
+std::string printable(std::string_view text) {
+  std::string shown(text.substr(0, 40));
+  std::replace_if(
+      shown.begin(), shown.end(), [](char letter) { return letter < ' ' || letter > '~'; }, '?');
+  return shown;
+}
 
 size_t size_bytes(PlyType type) { return kTypes[size_t(type)].bytes; }
 
@@ -127,9 +135,10 @@ PlyHeader read_ply_header(FileReader& file) {
       auto& properties = header.elements.back().properties;
       if (properties.size() == kMaxProperties) file.fail(" has over ", kMaxProperties, " properties in an element.");
       properties.push_back(property_of(words, file));
-    } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
-      file.fail(", line ", file.line(), ": \"", keyword.substr(0, 40),
-                "\" is nothing that the head of a PLY file has.");
+    } else if (keyword == "comment") {
+      header.comments.push_back(line.size() > 8 ? line.substr(8) : "");
+    } else if (!keyword.empty() && keyword != "obj_info") {
+      file.fail(", line ", file.line(), ": \"", printable(keyword), "\" is nothing that the head of a PLY file has.");
     }
   }
   file.fail(" has no end of its head (\"end_header\"): it is truncated or damaged; copy it again.");

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/files/file_reader.h"
@@ -11,6 +12,9 @@ namespace maq {
 
 enum class PlyForm { kAscii, kLittleEndian, kBigEndian };
 enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
+
+// The beginning of a text from a file, for sentences: damaged files have letters in it that no terminal shows.
+std::string printable(std::string_view text);
 
 size_t size_bytes(PlyType type);
 bool is_float(PlyType type);
@@ -37,6 +41,7 @@ struct PlyElement {
 struct PlyHeader {
   PlyForm form = PlyForm::kAscii;
   std::vector<PlyElement> elements;
+  std::vector<std::string> comments;  // without the keyword
 };
 
 // Reads up to the first byte of the data. Throws MAQ_ERROR_UNREADABLE, and MAQ_ERROR_UNSUPPORTED for versions other

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "support/samples/api_tiny_scene.h"
+#include "support/samples/made_splats.h"
 
 namespace {
 
@@ -60,6 +61,75 @@ TEST_F(ApiScenes, ASceneInUseMayBeSavedToItsOwnFileOrDeleted) {
   std::filesystem::remove(path());
   opened.save(path());
   EXPECT_EQ(read_text(path()), bytes);
+}
+
+TEST_F(ApiScenes, SplatsOfOtherProgramsAreOpenedAndRenderedWithoutABundle) {
+  MadeSplats made = made_splats(1, 1);
+  made.splats[0].position = {1, 2, 10};
+  made.splats[0].scale = {1, 1, 1};
+  made.splats[0].opacity = 0.999;
+  made.splats[0].coefficient = {1.5, 0, -1.5};
+  made.splats[0].sh = {};
+  write_text(folder_.file("splats.ply"), made.ply());
+  const maquette::Scene splats(context_, folder_.file("splats.ply"));
+  const maq_scene_info info = splats.info();
+  EXPECT_EQ(info.point_count, 1u);
+  EXPECT_EQ(info.view_dependent_count, 1u);
+  EXPECT_EQ(info.block_count, 0u);
+  EXPECT_EQ(info.coefficient_bits, 32);
+  EXPECT_EQ(info.up[1], -1);
+  EXPECT_EQ(info.bounds_max[2], 10);
+
+  maq_scene_renderer_config config = maquette::default_scene_renderer_config();
+  config.model.bundle_path = "there is none";
+  config.use_background = 1;
+  config.background[0] = 255;
+  maquette::SceneRenderer renderer(context_, config, splats);
+  maq_pinhole_camera camera{};
+  camera.struct_size = sizeof camera;
+  camera.intrinsics.width_px = camera.intrinsics.height_px = 64;
+  camera.intrinsics.fx_px = camera.intrinsics.fy_px = 64;
+  camera.intrinsics.cx_px = camera.intrinsics.cy_px = 32;
+  camera.rotation[0] = camera.rotation[4] = camera.rotation[8] = 1;
+  camera.centre[0] = 1, camera.centre[1] = 2;
+  const maquette::Image image = renderer.run(camera);
+  size_t stride = 0;
+  const auto* const bgr = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_BGR, &stride));
+  const auto* const alpha = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_ALPHA, &stride));
+  const auto* const depth = static_cast<const float*>(image.plane(MAQ_IMAGE_PLANE_DEPTH, &stride));
+  constexpr size_t kMiddle = 32 * 64 + 32;
+  EXPECT_NEAR(bgr[3 * kMiddle + 2], 235, 2);
+  EXPECT_NEAR(bgr[3 * kMiddle], 20, 2);
+  EXPECT_NEAR(alpha[kMiddle], 252, 2);
+  EXPECT_NEAR(double(depth[kMiddle]), 10, 0.01);
+  EXPECT_EQ(bgr[2], 255);
+  EXPECT_EQ(alpha[0], 0);
+  EXPECT_EQ(image.scene_stats().shaded_point_count, 1u);
+
+  EXPECT_EQ(maq_scene_save(splats.get(), folder_.file("splats.maqs").c_str()), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(maq_scene_save_ply(splats.get(), folder_.file("points.ply").c_str()), MAQ_ERROR_UNSUPPORTED);
+  EXPECT_EQ(open(folder_.file("nothing.ply")), MAQ_ERROR_NOT_FOUND);
+  write_text(folder_.file("points.ply"), made.ply("ascii", "rot_2"));
+  EXPECT_EQ(open(folder_.file("points.ply")), MAQ_ERROR_UNSUPPORTED);
+}
+
+TEST_F(ApiScenes, PointsAreSavedAsSplatsThatShowTheSame) {
+  for (const char* extension : {".ply", ".spz"}) {
+    scene_.save(folder_.file(std::string("ball") + extension));
+    const maquette::Scene splats(context_, folder_.file(std::string("ball") + extension));
+    EXPECT_EQ(splats.info().point_count, scene_.info().point_count);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(splats.info().bounds_min[axis], -1, 0.2);
+    maquette::SceneRenderer renderer(context_, maquette::default_scene_renderer_config(), splats);
+    const maquette::Image image = renderer.run(api_tiny_scene::camera_at(0.3, 100, 80));
+    size_t stride = 0;
+    const auto* const alpha = static_cast<const uint8_t*>(image.plane(MAQ_IMAGE_PLANE_ALPHA, &stride));
+    const auto* const depth = static_cast<const float*>(image.plane(MAQ_IMAGE_PLANE_DEPTH, &stride));
+    EXPECT_GT(alpha[40 * 100 + 50], 200);
+    EXPECT_NEAR(double(depth[40 * 100 + 50]), 2, 0.15) << "a ball of radius 1, seen from 3 away";
+    EXPECT_EQ(alpha[0], 0);
+    splats.save(folder_.file("again.glb"));
+    EXPECT_EQ(read_text(folder_.file("again.glb")).substr(0, 4), "glTF");
+  }
 }
 
 TEST_F(ApiScenes, SeveralThreadsUseOneScene) {

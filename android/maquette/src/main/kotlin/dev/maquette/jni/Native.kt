@@ -645,7 +645,7 @@ internal class maq_recorder_info(outer: Memory? = null, at: Int = 0) : Struct(24
     val frame_count get() = long(8); val size_bytes get() = long(16)
 }
 
-internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Struct(120, outer, at) {
+internal class maq_scene_build_config(outer: Memory? = null, at: Int = 0) : Struct(128, outer, at) {
     val model = maq_model_options(this, 8); var long_side_px: Int get() = int(40); set(v) = int(40, v)
     var coefficient_bits: Int get() = int(44); set(v) = int(44, v)
     var min_variation: Double get() = double(48); set(v) = double(48, v)

@@ -45,7 +45,7 @@ class Original:
 
 
 def write_plain(original: Original, folder: Path) -> int:
-    """Writes the photos of an original as PNG files, atomically, and gives their number. Raises PackageError, OSError."""
+    """Writes the photos as PNG files, atomically, and gives their number. Raises PackageError and OSError."""
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)

@@ -36,8 +36,8 @@ class Sample:
 class Sampling:
     """crop_px: side of the crops, a multiple of 32. sources: photos a crop is made from, at least and at most; the
     paper has 3. margin_px: the extractor sees of a photo a square so much wider than the crop. long_side_px: larger
-    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample. unseen: how often
-    the target is a held-out photo, which the cloud was not made from."""
+    photos are made smaller. jitter: how often colours are changed, the same for all photos of a sample. unseen: how
+    often the target is a held-out photo, which the cloud was not made from."""
 
     crop_px: int = 256
     sources: tuple[int, int] = (3, 3)

@@ -6,8 +6,8 @@
 `--data` holds folders `train` and `val` of captures (export.scenes.captures). `--pretrained` is the file of
 export.teachers.backbone: the extractor's trunk starts from it, and images are compared by its features; without it
 the trunk starts from random weights and images are compared by their pixels alone. `--start` begins with the weights of
-another run instead. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt (for export.scenes.export_onnx), log.json, curves.png,
-and sample.png: photo, ours, the plain points.
+another run instead. It resumes from `--out` by itself, saves every few minutes and on Ctrl-C: checkpoint.pt, weights.pt
+(for export.scenes.export_onnx), log.json, curves.png, and sample.png: photo, ours, the plain points.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class PhotoFaults:
 
 
 def draw_photo_faults(rng: np.random.Generator) -> PhotoFaults:
-    """Of one place. Half of the cameras keep their exposure."""
+    """Faults of one place. In half of the places no exposure changes."""
     changing = rng.random() < 0.5
     return PhotoFaults(
         exposure=float(rng.uniform(0.02, 0.1)) if changing else 0.0,

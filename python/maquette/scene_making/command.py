@@ -14,6 +14,7 @@ _EPILOG = """\
 examples:
   maquette scene make film.mp4 --out place.maqs
   maquette scene make photos --out place.maqs
+  maquette scene make photos --out place.spz    splats for other programs, fitted to the photos for a minute
 
 beside the scene: place-preview.jpg, place-report.json, place-report.txt, and place-work with the result of each stage.
 The same command goes on there after Ctrl-C. Film slowly, walk sideways, and show everything from several places.
@@ -27,7 +28,8 @@ def run(arguments: list[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("source", metavar="FILM_OR_FOLDER", help="a film, or a folder with photos")
-    parser.add_argument("-o", "--out", required=True, help="file of the scene: place.maqs; replaces an existing one")
+    parser.add_argument("-o", "--out", required=True,
+                        help="file of the scene: place.maqs; of splats: place.spz; it is replaced")  # fmt: skip
     parser.add_argument("--photos", type=int, default=MAX_PHOTOS, metavar="N",
                         help="photos or frames that are used at most; default: %(default)s")  # fmt: skip
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: all cores")

@@ -27,6 +27,8 @@ from maquette.scenes import Capture, Scene
 Progress = Callable[[float, str], "bool | None"]
 
 MAX_PHOTOS = 50
+SPLATS = (".spz", ".ply")  # a .glb file could not be read for the preview
+SPLAT_FIT_S = 60
 _VERSION = 1  # of the results in work folders
 _MIN_FREE_BYTES = 400_000_000
 _FULL_BYTES = 1_000_000
@@ -43,8 +45,9 @@ def make_scene(
     max_photos: int = MAX_PHOTOS,
     threads: int = 0,
 ) -> SceneReport:
-    """Makes a scene of a film or a folder of photos, and writes it to `out` (.maqs), with a preview and a report beside
-    it: NAME-preview.jpg, NAME-report.json and NAME-report.txt.
+    """Makes a scene of a film or a folder of photos, and writes it to `out`, with a preview and a report beside it:
+    NAME-preview.jpg, NAME-report.json and NAME-report.txt. `out` is a scene file (.maqs), or splats for other programs
+    (.spz, .ply), which are fitted to the photos for a minute.
 
     Frames of a film are chosen by sharpness and motion. Cameras are found by COLMAP (pip install 'maquette[scenes]').
     The unit of the scene is unknown, as photos alone do not tell metres. NAME-work keeps the result of each stage: the
@@ -94,8 +97,8 @@ class _Job:
             prepared = Prepared.of_json(self._stage("photos", self._photos))
             cameras = self._stage("cameras", lambda: self._cameras(prepared))
             cloud = self._stage("depth", self._depth)
-            built = self._stage("scene", self._scene, is_kept=self.out.exists())
-            compared = self._stage("preview", self._preview, is_kept=self.preview.exists())["compared"]
+            built = self._stage("scene", self._scene, makes=self.out)
+            compared = self._stage("preview", self._preview, makes=self.preview)["compared"]
             report = SceneReport(
                 source=str(self.source),
                 scene=str(self.out),
@@ -140,8 +143,11 @@ class _Job:
                 f"{self.source} is neither a film ({', '.join(ENDINGS[:6])}, ...) nor a folder of photos.",
                 "MAQ_ERROR_UNSUPPORTED",
             )
-        if self.out.suffix.lower() != ".maqs":
-            raise MaquetteError(f"{self.out} is no name of a scene; use {self.out.stem}.maqs.", "MAQ_ERROR_UNWRITABLE")
+        if self.out.suffix not in (".maqs", *SPLATS):
+            raise MaquetteError(
+                f"{self.out} is no name of a scene; use {self.out.stem}.maqs, or {self.out.stem}.spz for splats.",
+                "MAQ_ERROR_UNWRITABLE",
+            )
         stats = [(file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files]
         return {
             "version": _VERSION,
@@ -160,13 +166,14 @@ class _Job:
     def capture(self) -> Path:
         return self.work_path / "capture"
 
-    def _stage(self, name: str, run: Callable[[], dict[str, Any]], is_kept: bool = True) -> dict[str, Any]:
-        """The result of a stage: of an earlier run, or else of this one."""
+    def _stage(self, name: str, run: Callable[[], dict[str, Any]], makes: Path | None = None) -> dict[str, Any]:
+        """The result of a stage: of an earlier run, or else of this one. makes: a file that is there after it, and that
+        was made for this scene."""
         self._share = _STAGES[name]
         known = self.work.result(name)
-        if known is None or not is_kept:
+        if known is None or (makes and not (makes.exists() and known.get("out") == self.out.name)):
             start = time.monotonic()
-            known = run()
+            known = run() | ({"out": self.out.name} if makes else {})
             known["seconds"] = time.monotonic() - start
             self.work.finish(name, known)
         self.seconds[name] = known["seconds"]
@@ -223,7 +230,8 @@ class _Job:
         def told(done: float, _: str) -> None:
             self.tell(done, "building the scene")
 
-        with Scene.build(self.capture, progress=told, threads=self.threads) as scene:
+        fit_s = SPLAT_FIT_S if self.out.suffix in SPLATS else 0.0
+        with Scene.build(self.capture, progress=told, threads=self.threads, splat_fit_s=fit_s) as scene:
             scene.save(self.out)
             return {"points": scene.point_count, "bytes": self.out.stat().st_size}
 

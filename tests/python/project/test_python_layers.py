@@ -62,7 +62,7 @@ ALLOWED = {
         "export.keypoints", "export.onnx_graphs", "export.people", "export.teachers", "export.training",
     },
     "export.depth_frames": {"export.edges", "export.photos", "export.solids"},
-    "export.captures": {"export.camera", "export.photos", "export.point_cloud", "export.scenes"},
+    "export.captures": {"export.camera", "export.photos", "export.places", "export.point_cloud", "export.scenes"},
     "export.evaluation": {
         "export.body", "export.bundle", "export.camera", "export.densepose", "export.jobs", "export.keypoints",
         "export.people", "export.photos", "export.shards", "export.surface", "export.teachers", "export.training",

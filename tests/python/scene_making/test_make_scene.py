@@ -130,6 +130,13 @@ def test_after_an_interruption_at_any_stage_the_same_call_goes_on(room, sparse_c
     Path(report.preview).unlink()
     assert maquette.make_scene(room, out, threads=1).psnr_db == pytest.approx(report.psnr_db)
     assert ran == ["_preview"]
+    # Splats of the same photos need a scene and a preview of their own, and nothing else.
+    ran.clear()
+    monkeypatch.setattr(make, "SPLAT_FIT_S", 2)
+    splats = maquette.make_scene(room, out.with_suffix(".spz"), threads=1)
+    assert ran == ["_scene", "_preview"]
+    assert maquette.Scene.open(splats.scene).point_count == splats.scene_points > 1_000
+    assert splats.psnr_db > 12
 
 
 @needs_pycolmap

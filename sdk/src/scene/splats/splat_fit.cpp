@@ -19,8 +19,8 @@ namespace {
 // shift in units of the mean scale.
 constexpr size_t kFitColour = 0, kFitOpacity = 3, kFitScale = 4, kFitRotation = 7, kFitShift = 10, kFitted = 13;
 // The steps of Adam, larger than in programs for 3D Gaussian Splatting, because a fit is short.
-constexpr float kSteps[kFitted] = {0.02f, 0.02f, 0.02f, 0.05f, 0.03f, 0.03f, 0.03f,
-                                   0.02f, 0.02f, 0.02f, 0.03f, 0.03f, 0.03f};
+constexpr float kStepSizes[kFitted] = {0.02f, 0.02f, 0.02f, 0.05f, 0.03f, 0.03f, 0.03f,
+                                       0.02f, 0.02f, 0.02f, 0.03f, 0.03f, 0.03f};
 constexpr float kFinalStep = 0.1f;  // what is left of a step at the end
 constexpr float kMomentum = 0.9f, kSquaresMomentum = 0.99f;
 constexpr float kMinSquare = 1e-24f;
@@ -220,7 +220,7 @@ void SplatFit::update(FittedSplat& of, uint32_t place, const float* gradient, fl
     const float g = std::isfinite(gradient[k]) ? gradient[k] : 0;
     of.mean[k] = kMomentum * of.mean[k] + (1 - kMomentum) * g;
     of.squares[k] = kSquaresMomentum * of.squares[k] + (1 - kSquaresMomentum) * g * g;
-    change[k] = -size * kSteps[k] * unbias * of.mean[k] / std::sqrt(unbias_squares * of.squares[k] + kMinSquare);
+    change[k] = -size * kStepSizes[k] * unbias * of.mean[k] / std::sqrt(unbias_squares * of.squares[k] + kMinSquare);
   }
   Splat& splat = of.splat;
   for (size_t k = 0; k < 3; ++k) {

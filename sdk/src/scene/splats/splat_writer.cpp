@@ -64,13 +64,13 @@ std::vector<uint8_t> splat_ply_of(const Splats& splats) {
 uint8_t fraction_bits_of(const Splats& splats) {
   double largest = 0;
   for (size_t i = 0; i < splats.position.size(); ++i) largest = std::max(largest, std::abs(world_position(splats, i)));
-  constexpr double kSteps = (1 << 23) - 1;
-  if (largest > kSteps) {
+  constexpr double kPositionSteps = (1 << 23) - 1;
+  if (largest > kPositionSteps) {
     throw Error(MAQ_ERROR_UNSUPPORTED, "A splat is ", largest,
                 " units away from the origin, too far for an SPZ file, which has 24 bits; write a .ply file.");
   }
   uint8_t bits = 0;
-  while (bits < 16 && std::ldexp(largest, bits + 1) <= kSteps) ++bits;
+  while (bits < 16 && std::ldexp(largest, bits + 1) <= kPositionSteps) ++bits;
   return bits;
 }
 

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from export.densepose.average import averaged
+from export.average import averaged
 
 
 def weights(value: float, **more) -> dict:
@@ -37,3 +37,10 @@ def test_evidence_of_people_is_left_out_where_the_trained_weights_have_none():
 def test_weights_of_another_network_are_refused():
     with pytest.raises(ValueError, match="other is not in both"):
         averaged(weights(1, other=torch.ones(1)), weights(3), 0.5)
+
+
+def test_weights_of_scenes_are_averaged_too_and_of_two_kinds_refused():
+    start, trained = ({"networks": {"x": torch.tensor([v])}, "config": {}} for v in (1.0, 2.0))
+    assert averaged(start, trained, 0.5)["networks"]["x"] == 1.5
+    with pytest.raises(ValueError, match="one kind of network"):
+        averaged(start, weights(1), 0.5)

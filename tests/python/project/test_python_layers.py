@@ -15,6 +15,7 @@ ALLOWED = {
     "export.surface_grid": {"export.surface"},
     "export.keypoints": set(),
     "export.shards": {"export.surface"},
+    "export.average": set(),
     "export.camera": set(),
     "export.point_cloud": set(),
     "export.training": set(),

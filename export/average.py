@@ -1,7 +1,6 @@
 """Averages two sets of weights, of which one was trained from the other.
 
-    python -m export.densepose.average export/weights/densepose-b.pt .data/runs/crops/weights.pt \\
-        --out .data/runs/crops/half.pt
+    python -m export.average export/weights/densepose-b.pt .data/runs/crops/weights.pt --out .data/runs/crops/half.pt
 
 A short training on other data gains there and loses elsewhere; between its weights and those that it started from lie
 weights that keep most of both (Wortsman et al., "Robust fine-tuning of zero-shot models", CVPR 2022). Weights that the
@@ -16,12 +15,18 @@ from pathlib import Path
 
 import torch
 
+KEYS = ("ema", "networks")  # of the weights in files of dense pose and of scenes
+
 
 def averaged(start: dict, trained: dict, fraction: float) -> dict:
-    """The contents of `trained`, with "ema" interpolated between `start` (`fraction` 0) and `trained` (1). Both are
-    weights files of `export.densepose.train`. Raises ValueError for networks of different shapes."""
-    weights = dict(trained["ema"])
-    for name, before in start["ema"].items():
+    """`trained` with weights between those of `start` (`fraction` 0) and its own (1). Both are weights files
+    of `export.densepose.train` or of `export.scenes.train`. Raises ValueError for other files and for networks of
+    different shapes."""
+    key = next((key for key in KEYS if key in start and key in trained), None)
+    if key is None:
+        raise ValueError("these are not two files of weights of one kind of network")
+    weights = dict(trained[key])
+    for name, before in start[key].items():
         after = weights.get(name)
         if after is None and name.startswith("evidence."):
             continue
@@ -29,7 +34,7 @@ def averaged(start: dict, trained: dict, fraction: float) -> dict:
             raise ValueError(f"{name} is not in both, or of another shape: was one trained from the other?")
         if after.is_floating_point():
             weights[name] = torch.lerp(before.float(), after.float(), fraction).to(after.dtype)
-    return trained | {"ema": weights}
+    return trained | {key: weights}
 
 
 def main() -> None:

@@ -38,6 +38,12 @@ def training_data(places: Path) -> list[dict[str, str]]:
     return [rendered, *used, TRUNK]
 
 
+def with_earlier(data: list[dict[str, str]], bundle: Path) -> list[dict[str, str]]:
+    """Training data and that of a bundle whose weights the training began with. Raises OSError, ValueError."""
+    earlier = json.loads((bundle / "manifest.json").read_text())["training_data"]
+    return data + [entry for entry in earlier if entry not in data]
+
+
 def identity(manifest: dict) -> str:
     """Identity of the networks in a bundle, in hexadecimal; scenes built with them store it
     (docs/reference/formats.md)."""

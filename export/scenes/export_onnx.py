@@ -31,7 +31,7 @@ from export.bundle import BundleInfo
 from export.densepose.graphs import session
 from export.densepose.network import ConvBn
 from export.onnx_graphs import Doubled, channels_first, channels_last, largest_difference, write_graph
-from export.scenes.bundle import training_data, write_manifest
+from export.scenes.bundle import training_data, with_earlier, write_manifest
 from export.scenes.captures import Capture, read_captures
 from export.scenes.config import FEATURES, RASTER, SIZES
 from export.scenes.geometry.cameras import upright, warped
@@ -173,6 +173,10 @@ def main() -> None:
         help="the rendered places it was trained on: named in the manifest, and features get the range of colours on "
         "their photos, for int8",
     )
+    parser.add_argument(
+        "--started-from", type=Path, metavar="BUNDLE",
+        help="the bundle whose weights the training began with: its training data are named, too",
+    )  # fmt: skip
     options = parser.parse_args()
     torch.manual_seed(0)
     networks = Networks(SIZES[options.random]) if options.random else load_networks(options.checkpoint)
@@ -185,6 +189,8 @@ def main() -> None:
         size = (options.out / f"{name}.onnx").stat().st_size / 1e6
         print(f"{name}: {size:.2f} MB, {error:.1e} from torch; {FEATURES} features")
     trained_on = training_data(options.places) if options.places else []
+    if options.started_from:
+        trained_on = with_earlier(trained_on, options.started_from)
     info = BundleInfo(options.name or options.out.name, "fp32", training_data=tuple(trained_on))
     write_manifest(options.out, info)
 

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,7 +12,8 @@ import torch
 from box_scene import write_capture
 
 from export.densepose.network import MobileNetV2
-from export.scenes import train
+from export.scenes import samples, train
+from export.scenes.bundle import with_earlier
 from export.scenes.captures import read_captures
 from export.scenes.config import SIZES
 from export.scenes.losses import LossWeights, image_terms, own_rasters
@@ -76,6 +78,30 @@ def test_another_size_does_not_go_on_with_a_run(monkeypatch, places, tmp_path):
     run(monkeypatch, places, tmp_path, "--steps", "1")
     with pytest.raises(SystemExit, match="--size tiny, not small"):
         run(monkeypatch, places, tmp_path, "--steps", "2", "--size", "small")
+
+
+def test_a_run_begins_with_the_weights_of_another(monkeypatch, places, tmp_path):
+    run(monkeypatch, places, tmp_path / "a", "--steps", "1")
+    run(monkeypatch, places, tmp_path / "b", "--steps", "1", "--lr", "0", "--start", str(tmp_path / "a/weights.pt"))
+    first, second = (load_networks(tmp_path / name / "weights.pt") for name in "ab")
+    for (name, before), after in zip(first.named_parameters(), second.parameters(), strict=True):
+        assert torch.equal(before, after), name
+
+
+def test_targets_are_mostly_photos_that_the_cloud_was_not_made_of(places, monkeypatch):
+    (capture,) = read_captures(places / "train")
+    capture = replace(capture, held_out=frozenset({1}))
+    drawn = []
+    monkeypatch.setattr(samples, "drawn", lambda target, *_: drawn.append(target) or [0, 2])
+    for seed in range(40):
+        draw_sample([capture], SAMPLING, np.random.default_rng(seed))
+    assert 25 <= drawn.count(1) < 40
+
+
+def test_a_manifest_names_the_data_that_the_weights_before_learnt_from(tmp_path):
+    of_both, of_one = ({"name": name, "licence": "CC0-1.0", "used_for": "training"} for name in ("a", "b"))
+    (tmp_path / "manifest.json").write_text(json.dumps({"training_data": [of_both, of_one]}))
+    assert with_earlier([of_both], tmp_path) == [of_both, of_one]
 
 
 def test_a_few_steps_lower_the_loss_on_the_made_up_room(places):

@@ -265,7 +265,10 @@ def test_ctrl_c_ends_the_command_and_says_how_to_go_on(tmp_path):
     wall = texture()
     film = write_film(tmp_path / "film.avi", [window(wall, 4 * k) for k in range(120)])
     command = [sys.executable, "-m", "maquette", "scene", "make", film, "--out", tmp_path / "a.maqs"]
-    child = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={"PYTHONPATH": str(ROOT / "python")})
+    # Shells start programs in the background with Ctrl-C ignored, and children inherit it.
+    listening = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    environment = {"PYTHONPATH": str(ROOT / "python")}
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment, **listening)
     assert "choosing frames" in child.stderr.readline()
     time.sleep(0.3)
     child.send_signal(signal.SIGINT)

@@ -19,9 +19,11 @@ KEYS = ("ema", "networks")  # of the weights in files of dense pose and of scene
 
 
 def averaged(start: dict, trained: dict, fraction: float) -> dict:
-    """`trained` with weights between those of `start` (`fraction` 0) and its own (1). Both are weights files
-    of `export.densepose.train` or of `export.scenes.train`. Raises ValueError for other files and for networks of
-    different shapes."""
+    """Returns the contents of `trained`. Each weight is a mean of both: `start` at `fraction` 0, `trained` at 1.
+
+    Both are weights files of `export.densepose.train` or of `export.scenes.train`. Raises ValueError for other files
+    and for networks of different shapes.
+    """
     key = next((key for key in KEYS if key in start and key in trained), None)
     if key is None:
         raise ValueError("these are not two files of weights of one kind of network")

@@ -8,6 +8,18 @@ namespace maq {
 
 // Planes row by row, without padding; memory is kept between uses.
 struct RenderedImage {
+  // Makes room for colours, alpha and depth, whose content is then undefined, and empties the rest.
+  void set_size(int width, int height) {
+    const size_t pixels = size_t(width) * size_t(height);
+    width_px = width;
+    height_px = height;
+    bgr.resize(3 * pixels);
+    alpha.resize(pixels);
+    depth.resize(pixels);
+    normals.clear();
+    template_points.clear();
+  }
+
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> bgr;
   std::vector<uint8_t> alpha;  // coverage: 0 where nothing is

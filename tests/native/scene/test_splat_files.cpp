@@ -5,8 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "scene/splats/gzip_file.h"
-#include "scene/splats/splat_files.h"
+#include "scene/splats/files/gzip_file.h"
+#include "scene/splats/files/splat_files.h"
 #include "support/expect_error.h"
 #include "support/samples/made_splats.h"
 #include "support/temp_folder.h"

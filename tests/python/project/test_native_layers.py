@@ -20,7 +20,8 @@ CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 FUSED = CAPTURE | {"scene/capture", "scene/stereo"}
-SCENE = SEEN | FUSED | {"scene/fusion", "scene/assembly", "scene/render", "scene/splats"}
+SCENE = SEEN | FUSED | {"scene/fusion", "scene/assembly", "scene/render", "scene/splats",
+                          "scene/splats/files"}
 DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/keypoints", "densepose/surface",
              "densepose/texture", "densepose/tracking"}  # fmt: skip
 CURVES = {"edges", "edges/curves"}
@@ -95,6 +96,7 @@ MAY_INCLUDE = {
     "scene/assembly": SEEN | {"scene/fusion"},
     "scene/render": SEEN - {"scene/capture"},
     "scene/splats": CAPTURE - {"nn"} | {"scene/capture", "scene/format"},
+    "scene/splats/files": CAPTURE - {"nn"} | {"scene/capture", "scene/splats"},
     "sources": BACKEND | {"sources/android", "sources/v4l2", "sources/libcamera", "sources/depthai",
                           "sources/recording", "sources/files", "sources/synthetic"},
     "sources/android": BACKEND,
@@ -151,7 +153,7 @@ FOREIGN = {
     r"webp/.*": r"sdk/src/image/files/webp\.cpp",
     r"turbojpeg\.h": r"sdk/src/image/files/jpeg\.cpp",
     r"vpx/.*": r"sdk/src/image/clips/vp9_encoder\.cpp",
-    r"zlib\.h": r"sdk/src/(image/files/(png|tiff)|scene/splats/gzip_file)\.cpp",
+    r"zlib\.h": r"sdk/src/(image/files/(png|tiff)|scene/splats/files/gzip_file)\.cpp",
     r"GLFW/.*|epoxy/.*|imgui.*|backends/imgui.*": r"desktop_demo/src/.*",
     r"CLI/.*": r"sdk/tools/.*|desktop_demo/src/.*",
 }

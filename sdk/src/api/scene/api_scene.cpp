@@ -5,8 +5,8 @@
 #include "core/worker_threads.h"
 #include "scene/format/ply_writer.h"
 #include "scene/format/scene_file.h"
+#include "scene/splats/files/splat_files.h"
 #include "scene/splats/splat_discs.h"
-#include "scene/splats/splat_files.h"
 
 using namespace maq;
 

@@ -48,17 +48,6 @@ bool is_visible_rotation(const PixelMap& map, const PinholeCamera& camera) {
   return false;
 }
 
-void set_size(RenderedImage& image, int width_px, int height_px) {
-  const size_t pixels = size_t(width_px) * size_t(height_px);
-  image.width_px = width_px;
-  image.height_px = height_px;
-  image.bgr.resize(3 * pixels);
-  image.alpha.resize(pixels);
-  image.depth.resize(pixels);
-  image.normals.clear();
-  image.template_points.clear();
-}
-
 // BGR of red, green, blue in 0..1.
 std::array<uint8_t, 3> bytes_of(const std::array<float, 3>& colour) {
   const auto byte = [](float value) { return uint8_t(std::lround(255 * std::clamp(value, 0.0f, 1.0f))); };
@@ -221,7 +210,7 @@ RenderCounts SceneRenderer::render(const PinholeCamera& camera, RenderedImage& i
   const bool is_empty = occupied.width_px == 0;
   RenderedImage& aligned = frame.is_rotated ? aligned_image_ : image;
   const PinholeCamera& shown = frame.is_rotated ? frame.camera : camera;
-  set_size(aligned, shown.width_px, shown.height_px);
+  aligned.set_size(shown.width_px, shown.height_px);
   if (is_empty) {
     clear(aligned, background);
   } else {
@@ -229,7 +218,7 @@ RenderCounts SceneRenderer::render(const PinholeCamera& camera, RenderedImage& i
   }
   if (frame.is_rotated) {
     watch = Stopwatch();
-    set_size(image, camera.width_px, camera.height_px);
+    image.set_size(camera.width_px, camera.height_px);
     if (is_empty) {
       clear(image, background);
     } else {

@@ -14,17 +14,6 @@ namespace {
 
 uint8_t byte_of(float value) { return uint8_t(std::clamp(value * 255 + 0.5f, 0.0f, 255.0f)); }
 
-void make_room(RenderedImage& image, int width_px, int height_px) {
-  const size_t pixels = size_t(width_px) * size_t(height_px);
-  image.width_px = width_px;
-  image.height_px = height_px;
-  image.bgr.resize(3 * pixels);
-  image.alpha.resize(pixels);
-  image.depth.resize(pixels);
-  image.normals.clear();
-  image.template_points.clear();
-}
-
 // Writes a tile's pixels that are within the image.
 void write_tile(const TileSums& sums, int left_px, int top_px, const std::array<uint8_t, 3>& background,
                 RenderedImage& image) {
@@ -84,7 +73,7 @@ SplatRenderCounts SplatRenderer::render(const PinholeCamera& camera, RenderedIma
   const Stopwatch whole;
   Stopwatch watch;
   SplatRenderCounts counts;
-  make_room(image, camera.width_px, camera.height_px);
+  image.set_size(camera.width_px, camera.height_px);
   const int columns = divide_up(camera.width_px, kTileWidth_px), rows = divide_up(camera.height_px, kTileHeight_px);
   project(SplatView(camera, options_.near, chunks_.is_antialiased()), counts);
   counts.project_ms = watch.lap_ms();

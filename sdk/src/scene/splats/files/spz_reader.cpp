@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "scene/point_cloud.h"
-#include "scene/splats/gzip_file.h"
-#include "scene/splats/splat_files.h"
-#include "scene/splats/spz_format.h"
+#include "scene/splats/files/gzip_file.h"
+#include "scene/splats/files/splat_files.h"
+#include "scene/splats/files/spz_format.h"
 
 namespace maq {
 namespace {

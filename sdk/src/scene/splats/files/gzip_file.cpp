@@ -1,4 +1,4 @@
-#include "scene/splats/gzip_file.h"
+#include "scene/splats/files/gzip_file.h"
 
 #include <zlib.h>
 

@@ -3,7 +3,7 @@
 
 #include "scene/capture/ply_numbers.h"
 #include "scene/point_cloud.h"
-#include "scene/splats/splat_files.h"
+#include "scene/splats/files/splat_files.h"
 
 namespace maq {
 namespace {

@@ -5,9 +5,9 @@
 #include "core/files/atomic_file.h"
 #include "core/files/glb_writer.h"
 #include "core/math/rotation.h"
-#include "scene/splats/gzip_file.h"
-#include "scene/splats/splat_files.h"
-#include "scene/splats/spz_format.h"
+#include "scene/splats/files/gzip_file.h"
+#include "scene/splats/files/splat_files.h"
+#include "scene/splats/files/spz_format.h"
 
 namespace maq {
 namespace {

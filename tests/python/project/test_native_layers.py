@@ -20,8 +20,7 @@ CAPTURE = BASE | {"scene"}
 FITTED = CAPTURE | {"scene/capture", "scene/networks", "scene/format"}
 SEEN = FITTED | {"scene/visibility"}
 FUSED = CAPTURE | {"scene/capture", "scene/stereo"}
-SCENE = SEEN | FUSED | {"scene/fusion", "scene/assembly", "scene/render", "scene/splats",
-                          "scene/splats/files"}
+SCENE = SEEN | FUSED | {"scene/fusion", "scene/assembly", "scene/render", "scene/splats", "scene/splats/files"}
 DENSEPOSE = {"densepose/bundle", "densepose/crops", "densepose/detector", "densepose/keypoints", "densepose/surface",
              "densepose/texture", "densepose/tracking"}  # fmt: skip
 CURVES = {"edges", "edges/curves"}
